@@ -1,0 +1,207 @@
+"""Every table the pipeline writes: column, unit, meaning; and the one way to write and read it.
+
+Files are parquet. Units stand in each column's metadata (``unit``, ``meaning``); the file's own metadata holds the table's
+name, the digest of the code that made it and the config section it was made with (both JSON under ``plumbline``).
+"""
+
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from plumbline.errors import PlumblineError
+
+
+class Column(NamedTuple):
+    """One column: its pandas/arrow type, its SI unit ("" for none, "1" for a ratio) and its meaning."""
+
+    name: str
+    kind: str  # str, int, float, bool
+    unit: str
+    meaning: str
+
+
+def _c(name: str, kind: str, unit: str, meaning: str) -> Column:
+    return Column(name, kind, unit, meaning)
+
+
+def _xyz(prefix: str, unit: str, meaning: str) -> list[Column]:
+    return [_c(f"{prefix}_{a}", "float", unit, f"{meaning}, {w}") for a, w in zip("xyz", ("right", "forward", "up"), strict=True)]
+
+
+KEY = [
+    _c("trial", "str", "", "file name without ending; unique in a study"),
+    _c("subject", "str", "", "participant_id, with sub-"),
+    _c("task", "str", "", "BIDS task"),
+    _c("condition", "str", "", "BIDS acq, empty where none"),
+]
+
+TABLES: dict[str, list[Column]] = {
+    # -- recording: what the files hold, in SI and in the axes x right, y forward, z up
+    "trials": [
+        *KEY,
+        _c("session", "str", "", "BIDS ses, empty where none"),
+        _c("run", "str", "", "BIDS run"),
+        _c("files", "str", "", "the files of this trial, below raw/, joined by ' + '"),
+        _c("events", "str", "", "the events as JSON, list of [onset s, duration s, trial_type]; empty where no file"),
+        _c("rate", "float", "Hz", "rate of the frames"),
+        _c("force_rate", "float", "Hz", "rate of the plates, NaN without plates"),
+        _c("frames", "int", "", "number of frames"),
+        _c("duration", "float", "s", "last time minus first"),
+        _c("markers", "int", "", "markers with any valid frame"),
+        _c("plates", "int", "", "force plates that carry a load"),
+        _c("filled", "int", "", "marker samples filled across gaps"),
+        _c("missing", "int", "", "marker samples still missing"),
+        _c("axes", "str", "", "what the pipeline's axes are in the file, e.g. x=+Z y=+X z=+Y"),
+        _c("axes_from", "str", "", "config, or what they were found from"),
+        _c("force_sign", "float", "1", "factor that made the vertical force a reaction (+1 or -1)"),
+        _c("shear_sign", "float", "1", "factor on the shear forces beside force_sign (+1 or -1)"),
+        _c("mass", "float", "kg", "body mass from the plates, NaN where not known"),
+        _c("reason", "str", "", "empty where the trial was read, else the reason code"),
+        _c("message", "str", "", "what was wrong and where"),
+        _c("hint", "str", "", "what to do"),
+        _c("notes", "str", "", "what was assumed or found odd, JSON list"),
+    ],
+    "markers": [
+        *KEY[:2],
+        _c("frame", "int", "", "from 0 within the trial"),
+        _c("time", "float", "s", "the file's own time"),
+        _c("marker", "str", "", "label; derived points start with '@' (e.g. @CentreOfMass)"),
+        _c("x", "float", "m", "position, right"),
+        _c("y", "float", "m", "position, forward"),
+        _c("z", "float", "m", "position, up"),
+        _c("filled", "bool", "", "interpolated across a gap"),
+    ],
+    "plates": [
+        *KEY[:2],
+        _c("plate", "int", "", "from 1, in the file's order"),
+        _c("foot", "str", "", "left, right or empty"),
+        _c("sample", "int", "", "from 0 within the trial"),
+        _c("time", "float", "s", "the file's own time"),
+        *_xyz("force", "N", "ground reaction on the person"),
+        *_xyz("cop", "m", "centre of pressure on the plate's surface; NaN while unloaded"),
+        _c("moment_z", "float", "N m", "free vertical moment about the CoP"),
+    ],
+    # -- signals: one row per frame
+    "signals": [
+        *KEY,
+        _c("frame", "int", "", "from 0 within the trial"),
+        _c("time", "float", "s", "the file's own time"),
+        *_xyz("com", "m", "CoM, unfiltered, by the method named in `coverage`"),
+        *_xyz("com_table", "m", "CoM from the segment table, unfiltered"),
+        *_xyz("com_force", "m", "CoM by double integration of the force (band-limited; mean from the CoP)"),
+        *_xyz("com_lab", "m", "CoM as the file itself holds it"),
+        *_xyz("grf", "N", "net ground reaction, unfiltered"),
+        *_xyz("zmp", "m", "net centre of pressure in the ground plane, unfiltered"),
+        *_xyz("ang_mom", "kg m2/s", "angular momentum of the segments about the CoM (unfiltered positions), vector component"),
+        *_xyz("cop_left", "m", "CoP under the left foot"),
+        *_xyz("cop_right", "m", "CoP under the right foot"),
+        *_xyz("grf_left", "N", "reaction under the left foot"),
+        *_xyz("grf_right", "N", "reaction under the right foot"),
+        _c("limit_left", "float", "m", "left border of the support, x"),
+        _c("limit_right", "float", "m", "right border of the support, x"),
+        _c("limit_back", "float", "m", "rear border of the support, y"),
+        _c("limit_front", "float", "m", "front border of the support, y"),
+        *_xyz("com_lp", "m", "CoM, low-passed"),
+        *_xyz("com_dot", "m/s", "velocity of the low-passed CoM"),
+        *_xyz("com_ddot", "m/s2", "acceleration of the low-passed CoM"),
+        *_xyz("zmp_lp", "m", "ZMP, low-passed"),
+        _c("edge", "bool", "", "filtered columns are within the filter's reach of an end or a gap"),
+        _c("filled", "bool", "", "a marker behind the CoM was filled across a gap"),
+    ],
+    "coverage": [
+        *KEY,
+        _c("com_method", "str", "", "table, lab, force or none: which CoM the columns com_* hold"),
+        _c("marker_set", "str", "", "name of the marker set used, empty where none fits"),
+        _c("mass_share", "float", "1", "share of body mass that has segments"),
+        _c("missing_segments", "str", "", "segments without their markers, with the markers named"),
+        _c("mass", "float", "kg", "body mass used: from the plates, else participants.tsv"),
+        _c("height_com", "float", "m", "mean height of the CoM above the plates' surface"),
+        _c("lab_distance", "float", "m", "rms distance of the table's CoM from the lab's own, horizontal and vertical together"),
+        _c("support", "str", "", "what the support limits came from: markers, plates or none"),
+        _c("cutoff", "float", "Hz", "corner of the low-pass after the double pass"),
+        _c("filtered_before", "bool", "", "the file was low-passed before it came to us: its noise cannot be told"),
+        _c("limitation", "str", "", "what cannot be judged with this trial and why; empty where all can"),
+    ],
+    # -- loci: one row per locus
+    "loci": [
+        *KEY,
+        _c("locus", "int", "", "from 1 within the trial"),
+        _c("start", "float", "s", "first instant, the file's own time"),
+        _c("end", "float", "s", "last instant"),
+        _c("start_frame", "int", "", "first frame"),
+        _c("end_frame", "int", "", "last frame, included"),
+        _c("kind", "str", "", "recovering, recovering_from_beyond, falling or unrecovered"),
+        _c("side", "str", "", "left or right: where the CoM is farthest from its reference"),
+        _c("source", "str", "", "event or found"),
+        _c("reference", "float", "m", "lateral position the person keeps when nothing happens"),
+    ],
+    # -- pushes: windows in which an unmeasured force acts; masked in every plant equation
+    "pushes": [
+        *KEY,
+        _c("start", "float", "s", "first instant"),
+        _c("end", "float", "s", "last instant"),
+        _c("source", "str", "", "event or found"),
+        _c("peak", "float", "N", "largest external force in the window, NaN without shear"),
+    ],
+}
+
+
+class Stamp(NamedTuple):
+    """Who made a table: digest of the code, the config section."""
+
+    code: str = ""
+    config: Mapping[str, Any] | None = None
+
+
+_ARROW = {"str": pa.string(), "int": pa.int64(), "float": pa.float64(), "bool": pa.bool_()}
+
+
+def schema(name: str) -> pa.Schema:
+    """Arrow schema of a table, with unit and meaning of each column in its metadata."""
+    return pa.schema(
+        [pa.field(c.name, _ARROW[c.kind], metadata={"unit": c.unit, "meaning": c.meaning}) for c in TABLES[name]]
+    )
+
+
+def empty(name: str) -> pd.DataFrame:
+    """A table without rows."""
+    return schema(name).empty_table().to_pandas()
+
+
+def write(name: str, frame: pd.DataFrame, path: str | Path, stamp: Stamp = Stamp()) -> None:
+    """Write a table under a temporary name and rename it, so that a killed job leaves no half file.
+
+    Raises PlumblineError where the columns are not those of :data:`TABLES`.
+    """
+    want, have = [c.name for c in TABLES[name]], list(frame.columns)
+    if set(want) != set(have):
+        raise PlumblineError(
+            f"table {name}: missing columns {sorted(set(want) - set(have))}, unknown columns {sorted(set(have) - set(want))}"
+        )
+    table = pa.Table.from_pandas(frame[want], schema=schema(name), preserve_index=False)
+    about = {"table": name, "code": stamp.code, "config": stamp.config or {}}
+    table = table.replace_schema_metadata({"plumbline": json.dumps(about, sort_keys=True)})
+    target = Path(path)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    temporary = target.with_name(f".{target.name}.{os.getpid()}")
+    pq.write_table(table, temporary, compression="zstd")
+    temporary.replace(target)
+
+
+def read(name: str, path: str | Path, **options: Any) -> pd.DataFrame:
+    """Read one file of a table, or the folder of all its parts (in the order of their names)."""
+    source = Path(path)
+    files = sorted(source.glob("*.parquet")) if source.is_dir() else [source]
+    frames = [pq.read_table(f, **options).to_pandas() for f in files]
+    return pd.concat(frames, ignore_index=True) if frames else empty(name)
+
+
+def about(path: str | Path) -> dict[str, Any]:
+    """What a file says of itself: table, code digest, config section."""
+    return dict(json.loads((pq.read_schema(path).metadata or {}).get(b"plumbline", b"{}")))
