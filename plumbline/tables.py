@@ -6,7 +6,7 @@ name, the digest of the code that made it and the config section it was made wit
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -31,7 +31,10 @@ def _c(name: str, kind: str, unit: str, meaning: str) -> Column:
 
 
 def _xyz(prefix: str, unit: str, meaning: str) -> list[Column]:
-    return [_c(f"{prefix}_{a}", "float", unit, f"{meaning}, {w}") for a, w in zip("xyz", ("right", "forward", "up"), strict=True)]
+    return [
+        _c(f"{prefix}_{a}", "float", unit, f"{meaning}, {w}")
+        for a, w in zip("xyz", ("right", "forward", "up"), strict=True)
+    ]
 
 
 KEY = [
@@ -98,7 +101,11 @@ TABLES: dict[str, list[Column]] = {
         *_xyz("com_lab", "m", "CoM as the file itself holds it"),
         *_xyz("grf", "N", "net ground reaction, unfiltered"),
         *_xyz("zmp", "m", "net centre of pressure in the ground plane, unfiltered"),
-        *_xyz("ang_mom", "kg m2/s", "angular momentum of the segments about the CoM (unfiltered positions), vector component"),
+        *_xyz(
+            "ang_mom",
+            "kg m2/s",
+            "angular momentum of the segments about the CoM (unfiltered positions), vector component",
+        ),
         *_xyz("cop_left", "m", "CoP under the left foot"),
         *_xyz("cop_right", "m", "CoP under the right foot"),
         *_xyz("grf_left", "N", "reaction under the left foot"),
@@ -122,7 +129,12 @@ TABLES: dict[str, list[Column]] = {
         _c("missing_segments", "str", "", "segments without their markers, with the markers named"),
         _c("mass", "float", "kg", "body mass used: from the plates, else participants.tsv"),
         _c("height_com", "float", "m", "mean height of the CoM above the plates' surface"),
-        _c("lab_distance", "float", "m", "rms distance of the table's CoM from the lab's own, horizontal and vertical together"),
+        _c(
+            "lab_distance",
+            "float",
+            "m",
+            "rms distance of the table's CoM from the lab's own, horizontal and vertical together",
+        ),
         _c("support", "str", "", "what the support limits came from: markers, plates or none"),
         _c("cutoff", "float", "Hz", "corner of the low-pass after the double pass"),
         _c("filtered_before", "bool", "", "the file was low-passed before it came to us: its noise cannot be told"),
@@ -148,6 +160,102 @@ TABLES: dict[str, list[Column]] = {
         _c("end", "float", "s", "last instant"),
         _c("source", "str", "", "event or found"),
         _c("peak", "float", "N", "largest external force in the window, NaN without shear"),
+    ],
+    # -- fit: the base model per locus, condition and subject
+    "fit": [
+        _c("subject", "str", "", "participant_id, with sub-"),
+        _c("axis", "str", "", "lateral or forward"),
+        _c("level", "str", "", "what was fitted together: locus, condition or subject"),
+        _c("task", "str", "", "task of the locus; empty where pooled"),
+        _c("condition", "str", "", "condition; empty where pooled or where none"),
+        _c("trial", "str", "", "trial of the locus; empty where pooled"),
+        _c("locus", "int", "", "number of the locus; 0 where pooled"),
+        _c("omega", "float", "rad/s", "natural frequency of the CoM over the ZMP"),
+        _c("omega_low", "float", "rad/s", "lower end of the 95 % interval"),
+        _c("omega_high", "float", "rad/s", "upper end of the 95 % interval"),
+        _c("w2", "float", "1/s2", "omega squared"),
+        _c("w2_se", "float", "1/s2", "standard error of w2, clustered"),
+        _c("offset", "float", "m", "constant fitted beside w2, as a distance of the ZMP"),
+        _c("omega_height", "float", "rad/s", "sqrt(g / z) at the mean height of the CoM, for comparison"),
+        _c("windows", "int", "", "test functions used"),
+        _c("rejected", "int", "", "test functions that met a push, a gap or an end"),
+        _c("clusters", "int", "", "independent pieces behind the interval"),
+        _c("clustered_by", "str", "", "what the pieces are: locus (stretches between pushes) or block"),
+        _c("condition_number", "float", "1", "of the two-column regression"),
+        _c("rms", "float", "m", "rms of the residual as ZMP, constant included, in sample"),
+        _c("warning", "str", "", "empty, or why omega should not be trusted"),
+    ],
+    "heldout": [
+        *KEY,
+        _c("axis", "str", "", "lateral or forward"),
+        _c("fold", "int", "", "fold in which the trial was left out; 0 where the config names the test trials"),
+        _c("w2", "float", "1/s2", "w2 of the base model, from the other trials"),
+        _c("offset", "float", "m", "constant taken off (evaluation.offset: train), else 0"),
+        _c("windows", "int", "", "test functions judged"),
+        _c("square_sum", "float", "m2", "sum of squares of the weak residual as ZMP"),
+        _c("noise_variance", "float", "m2", "what sensor noise alone gives per window; NaN where not identifiable"),
+        _c("free_run_frames", "int", "", "frames of the free run"),
+        _c("free_run_square_sum", "float", "m2", "sum of squares of free-run CoM minus measured CoM"),
+    ],
+    # -- residuals: one row per frame and axis, at the held-out w2; bump-weighted means and derivatives
+    "residuals": [
+        *KEY,
+        _c("axis", "str", "", "lateral or forward"),
+        _c("frame", "int", "", "from 0 within the trial"),
+        _c("time", "float", "s", "the file's own time"),
+        _c("locus", "int", "", "number of the locus, 0 outside"),
+        _c("since", "float", "s", "time since the locus began, NaN outside"),
+        _c("com", "float", "m", "CoM, bump-weighted mean"),
+        _c("velocity", "float", "m/s", "velocity of the CoM, bump-weighted"),
+        _c("acceleration", "float", "m/s2", "x'' of the CoM, bump-weighted"),
+        _c("acceleration_model", "float", "m/s2", "w2 (x - p)"),
+        _c("zmp", "float", "m", "ZMP, bump-weighted mean"),
+        _c("zmp_model", "float", "m", "x - x''/w2"),
+        _c("r_plant", "float", "m/s2", "rP = x'' - w2 (x - p)"),
+        _c("error", "float", "m", "rP as ZMP: (x - p) - x''/w2"),
+        _c("r_force", "float", "m/s2", "rF = x'' - Fx/m, NaN without shear; what is wrong on the kinematic side"),
+        _c("r_vertical", "float", "m/s2", "z'' + g - Fz/m; what no plate carries"),
+        _c("com_measured", "float", "m", "CoM, unfiltered"),
+        _c("com_free", "float", "m", "CoM that the model gives for the measured ZMP (free run), NaN outside"),
+    ],
+    "where": [
+        *KEY[1:],
+        _c("axis", "str", "", "lateral or forward"),
+        _c("view", "str", "", "phase, time, trial or frequency"),
+        _c("trial", "str", "", "the trial, in view trial"),
+        _c("a", "float", "", "bin centre: CoM from its reference [m], time since the push [s] or frequency [Hz]"),
+        _c("b", "float", "", "bin centre: velocity [m/s] in view phase"),
+        _c("count", "int", "", "frames (segments in view frequency) in the bin"),
+        _c("sum", "float", "", "sum of the error [m]"),
+        _c(
+            "square_sum",
+            "float",
+            "",
+            "sum of squares of the error [m2]; of its power density [m2/Hz] in view frequency",
+        ),
+    ],
+    # -- cohort
+    "ladder": [
+        _c("ledger", "str", "", "plant, control or robot"),
+        _c("axis", "str", "", "lateral or forward"),
+        _c("task", "str", "", "all where pooled"),
+        _c("subject", "str", "", "all where pooled"),
+        _c("condition", "str", "", "all where pooled"),
+        _c("kind", "str", "", "weak (residual as ZMP) or free_run (CoM)"),
+        _c("model", "str", "", "name of the rung"),
+        _c("effects", "str", "", "effects in it, joined by ', '; empty for the paper's equation"),
+        _c("error_mm", "float", "mm", "held-out rms error"),
+        _c("ci_low_mm", "float", "mm", "lower end of its 95 % interval, trials resampled"),
+        _c("ci_high_mm", "float", "mm", "upper end"),
+        _c(
+            "noise_floor_mm", "float", "mm", "what sensor noise alone gives; NaN where not identifiable or for free_run"
+        ),
+    ],
+    "exclusions": [
+        _c("file", "str", "", "below raw/"),
+        _c("reason", "str", "", "reason code"),
+        _c("message", "str", "", "what was wrong and where"),
+        _c("hint", "str", "", "what to do"),
     ],
 }
 
@@ -179,6 +287,8 @@ def write(name: str, frame: pd.DataFrame, path: str | Path, stamp: Stamp = Stamp
 
     Raises PlumblineError where the columns are not those of :data:`TABLES`.
     """
+    if frame.empty and not len(frame.columns):
+        frame = empty(name)
     want, have = [c.name for c in TABLES[name]], list(frame.columns)
     if set(want) != set(have):
         raise PlumblineError(
@@ -194,12 +304,21 @@ def write(name: str, frame: pd.DataFrame, path: str | Path, stamp: Stamp = Stamp
     temporary.replace(target)
 
 
-def read(name: str, path: str | Path, **options: Any) -> pd.DataFrame:
-    """Read one file of a table, or the folder of all its parts (in the order of their names)."""
-    source = Path(path)
-    files = sorted(source.glob("*.parquet")) if source.is_dir() else [source]
-    frames = [pq.read_table(f, **options).to_pandas() for f in files]
-    return pd.concat(frames, ignore_index=True) if frames else empty(name)
+def read(name: str, path: str | Path, columns: list[str] | None = None) -> pd.DataFrame:
+    """Read one file of a table, or of some of its columns."""
+    if about(path).get("table") != name:
+        raise PlumblineError(f"{path} is no table '{name}'; delete results/ and run again")
+    return pq.read_table(path, columns=columns).to_pandas()
+
+
+def read_all(name: str, paths: Iterable[str | Path], columns: list[str] | None = None) -> pd.DataFrame:
+    """Read all parts of a table, in the order of subjects and not of parts: a cohort's result does not depend on its cutting."""
+    frames = [read(name, p, columns) for p in paths]
+    if not frames:
+        return empty(name)
+    table = pd.concat(frames, ignore_index=True)
+    by = [c for c in ("subject", "trial") if c in table]
+    return table.sort_values(by, kind="stable", ignore_index=True) if by else table
 
 
 def about(path: str | Path) -> dict[str, Any]:

@@ -1,0 +1,24 @@
+# plumbline: from raw recordings of balance to an identified, criticised model.
+# A study is a folder with raw/ and, if wanted, config.yaml; run it with `snakemake -s Snakefile -d STUDY -c2`.
+from snakemake.utils import min_version
+
+min_version("9.0")
+
+include: "workflow/rules/common.smk"
+include: "workflow/rules/recording.smk"
+include: "workflow/rules/signals.smk"
+include: "workflow/rules/loci.smk"
+include: "workflow/rules/fit.smk"
+include: "workflow/rules/residuals.smk"
+include: "workflow/rules/ladder.smk"
+include: "workflow/rules/figures.smk"
+include: "workflow/rules/report.smk"
+
+
+rule all:
+    default_target: True
+    input:
+        "results/report.html",
+        "results/verdict.json",
+        "results/ladder.parquet",
+        "results/exclusions.parquet",

@@ -1,0 +1,206 @@
+r"""The body as a chain of segments: made points, whole-body CoM and angular momentum.
+
+A segment with ends :math:`a` (proximal) and :math:`b` (distal) has its CoM at :math:`a + c\,(b - a)`. Known by two points, it
+turns with :math:`\Omega = u \times \dot u`, :math:`u = (b - a)/|b - a|`; a turn about its own long axis is not seen and left out.
+Harrington ME et al. (2007) J Biomech 40:595-602 for hip centres; de Leva 1996 for the numbers (``plumbline/segments.py``).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plumbline.markerset import MarkerSet, Segment
+from plumbline.segments import Numbers
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+MIN_MASS = 0.9  # [1] share of body mass below which no CoM is given
+FORWARD = np.array([0.0, 1.0, 0.0])  # pipeline axes: the subject's back-to-front direction
+
+
+@dataclass
+class Body:
+    """Segments of one trial that have their markers.
+
+    names, numbers: per segment.  proximal, distal: [m], shape (n, s, 3); where only some segments are missing in a frame,
+    `bridge` has put them where they last were relative to the others, and `filled` (n,) says so.
+    share: mass share of the segments.  missing: words, one entry per segment without markers.  notes: words.
+    """
+
+    names: list[str]
+    numbers: list[Numbers]
+    proximal: Array
+    distal: Array
+    filled: Mask
+    missing: list[str]
+    notes: list[str]
+
+    @property
+    def share(self) -> float:
+        """Share of body mass that has segments."""
+        return float(sum(n.mass for n in self.numbers))
+
+    @property
+    def _mass(self) -> Array:
+        return np.array([n.mass for n in self.numbers])
+
+    def centres(self) -> Array:
+        """CoM of each segment [m], shape (n, s, 3)."""
+        c = np.array([n.com for n in self.numbers])[:, None]
+        return np.asarray(self.proximal + c * (self.distal - self.proximal))
+
+    def com(self) -> Array:
+        """Whole-body CoM [m], shape (n, 3); NaN in frames without it, and everywhere below `MIN_MASS`."""
+        n = len(self.proximal)
+        if self.share < MIN_MASS - 1e-9:
+            return np.full((n, 3), np.nan)
+        return np.asarray(np.einsum("nsk,s->nk", self.centres(), self._mass) / self.share)
+
+    def angular_momentum(self, time: Array, mass: float) -> Array:
+        r"""Angular momentum about the CoM [kg m2/s], shape (n, 3).
+
+        :math:`L = \sum_i m_i (r_i - c) \times (v_i - \dot c) + I_i \Omega_i`; velocities by central differences of the positions
+        as they are. Segment masses are shares of `mass` [kg]; what has no segment is left out.
+        """
+        r = self.centres()
+        r = r - np.einsum("nsk,s->nk", r, self._mass)[:, None] / self.share
+        if len(time) < 2 or not self.numbers:
+            return np.full((len(time), 3), np.nan)
+        v = np.gradient(r, time, axis=0)
+        return np.asarray(mass * (np.einsum("nsk,s->nk", np.cross(r, v), self._mass) + self._spin(time)))
+
+    def _spin(self, time: Array) -> Array:
+        """Sum of the segments' own angular momenta per body mass [m2/s], shape (n, 3).
+
+        The turn about the segment's sagittal axis (forward, made normal to the long axis) uses the sagittal radius, the rest the
+        transverse one.
+        """
+        d = self.distal - self.proximal
+        length = np.linalg.norm(d, axis=2, keepdims=True)
+        u = d / length
+        omega = np.cross(u, np.gradient(u, time, axis=0))
+        s = FORWARD - (u @ FORWARD)[..., None] * u
+        norm2 = np.einsum("nsk,nsk->ns", s, s)[..., None]
+        about = s * np.einsum("nsk,nsk->ns", omega, s)[..., None] / np.where(norm2 > 0.05, norm2, np.inf)
+        ks, kt = (np.array([getattr(n, a) for n in self.numbers])[:, None] for a in ("sagittal", "transverse"))
+        spin = length**2 * (kt**2 * omega + (ks**2 - kt**2) * about)
+        return np.asarray(np.einsum("nsk,s->nk", spin, self._mass))
+
+
+def points(markers: Mapping[str, Array], markerset: MarkerSet) -> dict[str, Array]:
+    """Markers under the set's names, with the set's made points, each [m], shape (n, 3)."""
+    out = {name: markers[label] for name, label in markerset.resolve(markers).items()}
+    for name, spec in markerset.points.items():
+        if name in out:
+            continue
+        try:
+            out[name] = _made(spec, out)
+        except KeyError:
+            continue  # the segment that needs it is reported as missing, with its markers
+    return out
+
+
+def mean(names: Any, have: Mapping[str, Array]) -> Array:
+    """Mean of the named points; NaN where one of them is (a mean of the rest would jump)."""
+    return np.asarray(sum(have[n] for n in names) / len(names))
+
+
+def _made(spec: Mapping[str, Any], have: Mapping[str, Array]) -> Array:
+    if "hip" in spec:
+        asis = [have[n] for n in spec["asis"]]
+        return hip_centre(asis[0], asis[1], mean(spec["psis"], have), spec["hip"])
+    if "mean" in spec:
+        return mean(spec["mean"], have)
+    return np.asarray(mean(spec["at"], have) + spec["share"] * (mean(spec["to"], have) - mean(spec["from"], have)))
+
+
+def hip_centre(right_asis: Array, left_asis: Array, mid_psis: Array, side: str) -> Array:
+    """Hip joint centre from pelvis width and depth (Harrington 2007, the forms without leg length).
+
+    right_asis, left_asis, mid_psis: [m], shape (n, 3).  side: "right" or "left".  Returns [m], shape (n, 3).
+    """
+    middle = (right_asis + left_asis) / 2.0
+    width = np.linalg.norm(right_asis - left_asis, axis=1, keepdims=True)
+    back = middle - mid_psis
+    depth = np.linalg.norm(back, axis=1, keepdims=True)
+    z = (right_asis - left_asis) / width
+    x = back - np.sum(back * z, axis=1, keepdims=True) * z
+    x = x / np.linalg.norm(x, axis=1, keepdims=True)
+    y = np.cross(z, x)
+    sign = 1.0 if side == "right" else -1.0
+    forward, up, out = -0.24 * depth - 0.0099, -0.30 * width - 0.0109, 0.33 * width + 0.0073
+    return np.asarray(middle + forward * x + up * y + sign * out * z)
+
+
+def build(markers: Mapping[str, Array], markerset: MarkerSet, sex: str) -> Body:
+    """Segments of a trial from its markers ([m], label -> (n, 3)) and a marker set.
+
+    A segment never seen is named in `missing` with its markers; one missing in some frames only is bridged.
+    """
+    have = points(markers, markerset)
+    found = [
+        (s, mean(s.proximal, have), mean(s.distal, have)) for s in markerset.segments if set(s.markers) <= set(have)
+    ]
+    found = [(s, a, b) for s, a, b in found if np.isfinite(a + b).all(axis=1).any()]
+    names = {s.name for s, _, _ in found}
+    missing = [_lack(s, have, markerset) for s in markerset.segments if s.name not in names]
+    n = len(next(iter(markers.values()))) if markers else 0
+    a = np.stack([f[1] for f in found], axis=1) if found else np.zeros((n, 0, 3))
+    b = np.stack([f[2] for f in found], axis=1) if found else np.zeros((n, 0, 3))
+    body = Body(
+        [s.name for s, _, _ in found], [s.numbers(sex) for s, _, _ in found], a, b, np.zeros(n, bool), missing, []
+    )
+    _bridge(body)
+    if sex == "" and any(s.table for s, _, _ in found):
+        body.notes.append("sex not stated in participants.tsv: segment numbers are the mean of both sexes")
+    if missing and body.share >= MIN_MASS:
+        body.notes.append(f"the CoM leaves out {1.0 - body.share:.1%} of body mass that has no segment")
+    return body
+
+
+def _lack(segment: Segment, have: Mapping[str, Array], markerset: MarkerSet) -> str:
+    def gone(name: str) -> list[str]:
+        if name in have and np.isfinite(have[name]).all(axis=1).any():
+            return []
+        inputs = markerset.points.get(name, {})
+        sources = [s for key, value in inputs.items() if isinstance(value, list) for s in value if key != "share"]
+        return [x for s in sources for x in gone(s)] or [name] if sources else [name]
+
+    lacking = dict.fromkeys(x for name in segment.markers for x in gone(name))
+    return f"{segment.name} ({', '.join(lacking)})"
+
+
+def _bridge(body: Body) -> None:
+    """Keep a segment that is missing in a few frames where it last was relative to the others, and flag the frames.
+
+    Dropping it for some frames only would make the CoM jump. In a frame where segments of less than `MIN_MASS` are seen, all are
+    set to NaN.
+    """
+    seen = np.isfinite(body.proximal + body.distal).all(axis=2)
+    usable = seen @ body._mass >= MIN_MASS - 1e-9
+    steady = seen[usable].all(axis=0)
+    gappy = ~steady & seen[usable].any(axis=0)
+    if not usable.any() or not steady.any():
+        usable = seen.all(axis=1)
+        gappy[:] = False
+    m = body._mass * steady
+    anchor = np.einsum("nsk,s->nk", np.nan_to_num(body.centres()), m)[:, None] / max(m.sum(), 1e-12)
+    for ends in (body.proximal, body.distal):
+        for s in np.flatnonzero(gappy):
+            ends[:, s] = anchor[:, 0] + _carried(ends[:, s] - anchor[:, 0], seen[:, s] & usable)
+        ends[~usable] = np.nan
+    body.filled |= usable & ~seen[:, gappy].all(axis=1)
+    for s in np.flatnonzero(gappy):
+        lost = int((usable & ~seen[:, s]).sum())
+        body.notes.append(
+            f"{body.names[s]} is not seen in {lost} frames: kept in place relative to the other segments there"
+        )
+
+
+def _carried(offset: Array, known: Mask) -> Array:
+    where = np.arange(len(offset))
+    return np.stack([np.interp(where, where[known], offset[known, k]) for k in range(3)], axis=1)

@@ -1,0 +1,66 @@
+"""The config of a study: closed, typed, with defaults and a "did you mean"."""
+
+import json
+from collections.abc import Iterator, Mapping
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+
+from plumbline.errors import PlumblineError
+
+SCHEMAS = Path(__file__).resolve().parents[1] / "workflow" / "schemas"
+
+
+def config_schema() -> dict[str, Any]:
+    """JSON schema of config.yaml, the `columns:` grammar included."""
+    schema = json.loads((SCHEMAS / "config.json").read_text(encoding="utf-8"))
+    columns = json.loads((SCHEMAS / "columns.json").read_text(encoding="utf-8"))
+    schema["properties"]["columns"] = {**columns, "default": []}
+    return dict(schema)
+
+
+def with_defaults(config: Mapping[str, Any] | None, source: str = "config.yaml") -> dict[str, Any]:
+    """The config with every default filled in; an absent file, an empty one and ``{}`` are alike.
+
+    Raises PlumblineError naming the key, its place and, for a misspelt key, the nearest known one.
+    """
+    schema = config_schema()
+    filled = _fill(schema, dict(config or {}))
+    problems = list(_problems(schema, filled))
+    if problems:
+        raise PlumblineError(f"{source}: " + "; ".join(problems))
+    return filled
+
+
+def _fill(schema: Mapping[str, Any], given: dict[str, Any]) -> dict[str, Any]:
+    out = dict(given)
+    for key, sub in schema.get("properties", {}).items():
+        if key not in out and "default" in sub:
+            out[key] = sub["default"]
+        if sub.get("type") == "object" and out.get(key) is None and key in given:
+            out[key] = {}  # a section whose lines are all commented out
+        if isinstance(out.get(key), dict) and sub.get("type") == "object":
+            out[key] = _fill(sub, out[key])
+    return out
+
+
+def _problems(schema: Mapping[str, Any], config: Mapping[str, Any]) -> Iterator[str]:
+    for error in jsonschema.Draft202012Validator(schema).iter_errors(config):
+        yield from _explain(error)
+
+
+def _explain(error: Any) -> Iterator[str]:
+    place = ".".join(str(p) for p in error.absolute_path)
+    if error.validator == "additionalProperties":
+        known = list(error.schema.get("properties", {}))
+        for key in sorted(set(error.instance) - set(known)):
+            near = get_close_matches(str(key), known, n=1, cutoff=0.5)
+            advice = f"did you mean '{near[0]}'?" if near else f"known here: {', '.join(known)}"
+            yield f"unknown key '{place + '.' if place else ''}{key}': {advice}"
+    elif error.context:
+        deepest = max(error.context, key=lambda e: len(e.absolute_path))
+        yield f"'{place}': {deepest.message}"
+    else:
+        yield f"'{place}': {error.message}"

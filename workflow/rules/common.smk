@@ -1,0 +1,62 @@
+# What every rule file uses: the validated config, the study, its parts, the digest of the code behind a script.
+import os
+import sys
+from pathlib import Path
+
+import yaml
+
+REPO = Path(workflow.basedir)
+sys.path.insert(0, str(REPO))
+
+from plumbline import study as studies
+from plumbline.config import with_defaults
+from plumbline.errors import PlumblineError
+from plumbline.provenance import digest
+
+# numbers, fonts and file bytes must not depend on the machine's load or clock
+os.environ.update(
+    OPENBLAS_NUM_THREADS="1", OMP_NUM_THREADS="1", MKL_NUM_THREADS="1", SOURCE_DATE_EPOCH="0", MPLBACKEND="agg"
+)
+
+if Path("config.yaml").is_file() and yaml.safe_load(Path("config.yaml").read_text(encoding="utf-8")):
+
+    configfile: "config.yaml"
+
+
+try:
+    config = with_defaults(config)
+    STUDY = studies.find(Path("."), config["raw"])
+    if not (STUDY.trials or STUDY.exclusions):
+        raise PlumblineError(
+            f"{STUDY.raw}/ of {Path.cwd()} holds no recording: put files there as the README shows, "
+            "or type `make run` in the repository, which makes the demo's"
+        )
+except PlumblineError as error:
+    raise WorkflowError(str(error)) from None
+
+SIZE = config["subjects_per_job"]
+PART_OF = studies.assign(STUDY.subjects, SIZE, studies.read_parts(Path("results/parts.tsv"), SIZE))
+PARTS = sorted(set(PART_OF.values()))
+
+
+wildcard_constraints:
+    part=r"part-\d{4}",
+
+
+onstart:
+    studies.write_parts(PART_OF, SIZE, Path("results/parts.tsv"))
+
+
+def trials(part):
+    """Trials of a part's subjects."""
+    return [t for t in STUDY.trials if PART_OF[t.subject] == part]
+
+
+def code(script):
+    """Digest of a script and of the library modules it uses, transitively: edited code re-runs what depends on it."""
+    return digest(REPO / "scripts" / script)
+
+
+def parts(table):
+    """Files of a table for every part."""
+    return expand("results/{table}/{part}.parquet", table=table, part=PARTS)

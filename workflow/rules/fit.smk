@@ -1,0 +1,17 @@
+# Base model x'' = w2 (x - xZ): w2 per locus, condition and subject, and its error on trials left out.
+rule fit:
+    input:
+        signals="results/signals/{part}.parquet",
+        coverage="results/coverage/{part}.parquet",
+        pushes="results/pushes/{part}.parquet",
+        loci="results/loci/{part}.parquet",
+    output:
+        fit="results/fit/{part}.parquet",
+        heldout="results/heldout/{part}.parquet",
+    params:
+        code=code("fit.py"),
+        config=config["evaluation"],
+    log:
+        "results/logs/fit/{part}.log",
+    script:
+        "../../scripts/fit.py"

@@ -1,0 +1,16 @@
+# Held-out error of each model, and the verdict other programs read.
+rule ladder:
+    input:
+        heldout=parts("heldout"),
+        coverage=parts("coverage"),
+    output:
+        ladder="results/ladder.parquet",
+        verdict="results/verdict.json",
+    params:
+        code=code("ladder.py"),
+        config=config["evaluation"],
+        csv=config["csv"],
+    log:
+        "results/logs/ladder.log",
+    script:
+        "../../scripts/ladder.py"

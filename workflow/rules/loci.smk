@@ -1,0 +1,16 @@
+# Signals and events -> pushes (masked everywhere) and loci, one row each.
+rule loci:
+    input:
+        signals="results/signals/{part}.parquet",
+        coverage="results/coverage/{part}.parquet",
+        trials="results/trials/{part}.parquet",
+    output:
+        loci="results/loci/{part}.parquet",
+        pushes="results/pushes/{part}.parquet",
+    params:
+        code=code("loci.py"),
+        config={},
+    log:
+        "results/logs/loci/{part}.log",
+    script:
+        "../../scripts/loci.py"

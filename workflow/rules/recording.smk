@@ -1,0 +1,36 @@
+# Files -> trials, markers, plates: SI units, axes x right, y forward, z up, reaction forces, flagged gaps.
+rule recording:
+    input:
+        lambda w: [f for t in trials(w.part) for f in (*t.files, *([t.events] if t.events else []))],
+    output:
+        trials="results/trials/{part}.parquet",
+        markers="results/markers/{part}.parquet",
+        plates="results/plates/{part}.parquet",
+    params:
+        code=code("recording.py"),
+        config=config["recording"],
+        trials=lambda w: [t.plain() for t in trials(w.part)],
+        raw=str(STUDY.raw),
+        axes=config["axes"],
+        columns=config["columns"],
+    log:
+        "results/logs/recording/{part}.log",
+    script:
+        "../../scripts/recording.py"
+
+
+# Files that could not be used, one row each.
+rule exclusions:
+    input:
+        parts("trials"),
+    output:
+        "results/exclusions.parquet",
+    params:
+        code=code("exclusions.py"),
+        config={},
+        unused=[list(vars(e).values()) for e in STUDY.exclusions],
+        csv=config["csv"],
+    log:
+        "results/logs/exclusions.log",
+    script:
+        "../../scripts/exclusions.py"
