@@ -64,3 +64,17 @@ def _explain(error: Any) -> Iterator[str]:
         yield f"'{place}': {deepest.message}"
     else:
         yield f"'{place}': {error.message}"
+
+
+def study_config(folder: Path) -> dict[str, Any]:
+    """The config of the study in a folder, defaults filled in."""
+    import yaml  # only here: the Snakefile brings its own
+
+    file = folder / "config.yaml"
+    try:
+        given = yaml.safe_load(file.read_text(encoding="utf-8")) if file.is_file() else {}
+    except yaml.YAMLError as error:
+        raise PlumblineError(f"{file}: no valid YAML: {error}") from None
+    if given is not None and not isinstance(given, dict):
+        raise PlumblineError(f"{file}: must be a map of keys to values")
+    return with_defaults(given, str(file))

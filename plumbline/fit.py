@@ -98,9 +98,7 @@ def _fits(mine: Sequence[Windows]) -> Iterator[dict[str, Any]]:
     yield from _row([(w, w.picked) for w in mine], "subject", {"task": "", "condition": "", "trial": "", "locus": 0})
 
 
-def _row(
-    chosen: Sequence[tuple[Windows, NDArray[np.int64]]], level: str, about: dict[str, Any]
-) -> Iterator[dict[str, Any]]:
+def _row(chosen: Sequence[tuple[Windows, NDArray[np.int64]]], level: str, about: dict[str, Any]) -> Iterator[dict[str, Any]]:
     alone = level == "locus"
     got = solve(chosen, blocks=alone)
     if got is None:

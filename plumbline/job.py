@@ -21,9 +21,7 @@ def start(snakemake: Any) -> Stamp:
     log = Path(snakemake.log[0])
     log.parent.mkdir(parents=True, exist_ok=True)
     params = snakemake.params
-    log.write_text(
-        f"plumbline {__version__}, Python {platform.python_version()}, code {params.code}\n", encoding="utf-8"
-    )
+    log.write_text(f"plumbline {__version__}, Python {platform.python_version()}, code {params.code}\n", encoding="utf-8")
 
     def keep(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
         with log.open("a", encoding="utf-8") as handle:

@@ -169,9 +169,7 @@ def _trial(got: Mapping[str, str], files: Iterable[Path]) -> Trial:
     clean = {k: got.get(k, "") for k in ENTITIES}
     clean["sub"] = clean["sub"].removeprefix("sub-")
     name = "_".join(f"{k}-{clean[k]}" for k in ENTITIES if clean[k])
-    return Trial(
-        name, f"sub-{clean['sub']}", clean["ses"], clean["task"], clean["acq"], clean["run"], tuple(sorted(files))
-    )
+    return Trial(name, f"sub-{clean['sub']}", clean["ses"], clean["task"], clean["acq"], clean["run"], tuple(sorted(files)))
 
 
 def _group(pairs: Iterable[tuple[dict[str, str], Path]]) -> list[Trial]:
@@ -229,9 +227,7 @@ def _listed(raw: Path, found: list[Path], table: Path) -> tuple[list[Trial], lis
 def _entity(value: str, table: Path, line: int, column: str) -> str:
     value = "" if value.lower() == "n/a" else value.strip()
     if value and not re.fullmatch(r"[^\W_]+", value):
-        raise PlumblineError(
-            f"{table}: line {line}: '{value}' ({column}) may hold letters and digits only, as BIDS asks"
-        )
+        raise PlumblineError(f"{table}: line {line}: '{value}' ({column}) may hold letters and digits only, as BIDS asks")
     return value
 
 
@@ -252,9 +248,7 @@ def _rows(table: Path, required: tuple[str, ...]) -> Iterator[tuple[int, dict[st
         header = [h.strip() for h in reader.fieldnames or []]
         for name in required:
             if name not in header:
-                raise PlumblineError(
-                    f"{table}: no column '{name}'; it has: {', '.join(header) or 'nothing'} (tab-separated?)"
-                )
+                raise PlumblineError(f"{table}: no column '{name}'; it has: {', '.join(header) or 'nothing'} (tab-separated?)")
         reader.fieldnames = header
         for row in reader:
             if any(isinstance(v, str) and v.strip() for v in row.values()):

@@ -31,10 +31,7 @@ def _c(name: str, kind: str, unit: str, meaning: str) -> Column:
 
 
 def _xyz(prefix: str, unit: str, meaning: str) -> list[Column]:
-    return [
-        _c(f"{prefix}_{a}", "float", unit, f"{meaning}, {w}")
-        for a, w in zip("xyz", ("right", "forward", "up"), strict=True)
-    ]
+    return [_c(f"{prefix}_{a}", "float", unit, f"{meaning}, {w}") for a, w in zip("xyz", ("right", "forward", "up"), strict=True)]
 
 
 KEY = [
@@ -247,9 +244,7 @@ TABLES: dict[str, list[Column]] = {
         _c("error_mm", "float", "mm", "held-out rms error"),
         _c("ci_low_mm", "float", "mm", "lower end of its 95 % interval, trials resampled"),
         _c("ci_high_mm", "float", "mm", "upper end"),
-        _c(
-            "noise_floor_mm", "float", "mm", "what sensor noise alone gives; NaN where not identifiable or for free_run"
-        ),
+        _c("noise_floor_mm", "float", "mm", "what sensor noise alone gives; NaN where not identifiable or for free_run"),
     ],
     "exclusions": [
         _c("file", "str", "", "below raw/"),
@@ -272,9 +267,7 @@ _ARROW = {"str": pa.string(), "int": pa.int64(), "float": pa.float64(), "bool": 
 
 def schema(name: str) -> pa.Schema:
     """Arrow schema of a table, with unit and meaning of each column in its metadata."""
-    return pa.schema(
-        [pa.field(c.name, _ARROW[c.kind], metadata={"unit": c.unit, "meaning": c.meaning}) for c in TABLES[name]]
-    )
+    return pa.schema([pa.field(c.name, _ARROW[c.kind], metadata={"unit": c.unit, "meaning": c.meaning}) for c in TABLES[name]])
 
 
 def empty(name: str) -> pd.DataFrame:

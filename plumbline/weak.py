@@ -33,9 +33,7 @@ class Bump:
 
     def __post_init__(self) -> None:
         if self.reach < 4:
-            raise ValueError(
-                f"half width {self.half_width} s holds only {self.reach} samples at {self.rate} Hz, needs 4"
-            )
+            raise ValueError(f"half width {self.half_width} s holds only {self.reach} samples at {self.rate} Hz, needs 4")
 
     @property
     def reach(self) -> int:

@@ -1,0 +1,124 @@
+"""The command line: ask what is usable, name own files, link public data, compare with references."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+
+from plumbline import __version__
+from plumbline.errors import PlumblineError
+
+REPO = Path(__file__).resolve().parents[1]
+
+
+class Polite(click.Group):
+    """A group whose commands report our own errors in one line and exit with 2."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command."""
+        try:
+            return super().invoke(ctx)
+        except PlumblineError as error:
+            raise click.ClickException(str(error)) from None
+
+
+@click.group(cls=Polite, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__)
+def main() -> None:
+    """plumbline: from raw recordings of balance to an identified, criticised model."""
+
+
+@main.command()
+@click.argument("folder", type=click.Path(exists=True, file_okay=False, path_type=Path))
+def check(folder: Path) -> None:
+    """Say what in the study FOLDER is usable, and why the rest is not. Writes nothing."""
+    from plumbline.check import lines
+
+    usable = False
+    for line in lines(folder):
+        usable = usable or line.usable
+        click.secho(line.text, fg=line.colour)
+    if not usable:
+        raise click.exceptions.Exit(1)
+
+
+@main.command()
+@click.argument("folder", type=click.Path(exists=True, file_okay=False, path_type=Path))
+@click.option("--pattern", required=True, help="How the files are named, e.g. '{participant}_{task}_{run}.c3d'.")
+@click.option("--task", default="", help="The task, where the names do not hold it.")
+@click.option("--force", is_flag=True, help="Replace a recordings.tsv that is there already.")
+def adopt(folder: Path, pattern: str, task: str, force: bool) -> None:
+    """Write FOLDER/recordings.tsv for files with their own names. Nothing is renamed or moved."""
+    from plumbline.adopt import adopt as write
+
+    for text in write(folder, pattern, task=task, force=force):
+        click.echo(text)
+
+
+@main.command()
+@click.argument("folder", type=click.Path(exists=True, file_okay=False, path_type=Path))
+def data(folder: Path) -> None:
+    """Link the public data sets in FOLDER into studies/NAME/raw, where a study of that name is part of plumbline."""
+    linked = 0
+    for study in sorted(p.parent for p in (REPO / "studies").glob("*/recordings.tsv")):
+        source, link = (folder / study.name).resolve(), study / "raw"
+        if not source.is_dir():
+            click.echo(f"{study.name}: not in {folder}; its README says where to get it")
+            continue
+        if link.is_symlink():
+            link.unlink()
+        if link.exists():
+            raise PlumblineError(f"{link} is a folder of its own; move it away first")
+        link.symlink_to(source, target_is_directory=True)
+        linked += 1
+        click.echo(f"{study.name}: linked; run it with `make run STUDY=studies/{study.name}`")
+    if not linked:
+        raise PlumblineError(f"{folder} holds none of the data sets that studies/ knows")
+
+
+@main.command()
+@click.argument("folder", type=click.Path(path_type=Path))
+def demo(folder: Path) -> None:
+    """Make the recordings of the demo study in FOLDER (simulated; nothing is measured)."""
+    from plumbline.simulate.demo import write
+
+    write(folder)
+    click.echo(f"demo: simulated recordings written to {folder}")
+
+
+@main.command()
+def papers() -> None:
+    """Compare results with the committed references, column by column; the exit code is 1 where one drifts."""
+    from plumbline.papers import compare_all
+
+    fine = True
+    for line, ok in compare_all(REPO):
+        fine = fine and ok
+        click.secho(line, fg=None if ok else "red")
+    if not fine:
+        raise click.exceptions.Exit(1)
+
+
+@main.command(hidden=True)
+def lint() -> None:
+    """Snakemake's own lint, without its wish for conda environments (the lock pins them)."""
+    snakemake = Path(sys.executable).with_name("snakemake")
+    done = subprocess.run([snakemake, "--lint", "json", "-s", REPO / "Snakefile", "-d", REPO], capture_output=True, text=True)
+    start = done.stdout.find("{")
+    if start < 0:
+        raise PlumblineError(f"snakemake --lint said nothing to read: {done.stderr.strip()[-500:]}")
+    found = json.loads(done.stdout[start:])
+    problems = [
+        f"{rule['for']}: {lint['title']}"
+        for rules in found.values()
+        for rule in rules
+        for lint in rule["lints"]
+        if "conda" not in lint["title"].lower() and "software environment" not in lint["title"].lower()
+    ]
+    click.echo(os.linesep.join(problems) or "snakemake --lint: nothing to say")
+    if problems:
+        raise click.exceptions.Exit(1)

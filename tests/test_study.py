@@ -1,0 +1,105 @@
+"""Finding the trials of a study by name; parts that survive insertion."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from plumbline.errors import PlumblineError
+from plumbline.study import Trial, assign, entities, find
+
+
+def touch(*files: Path) -> None:
+    for f in files:
+        f.parent.mkdir(parents=True, exist_ok=True)
+        f.write_text("x")
+
+
+def test_bids_names_and_companions(tmp_path: Path) -> None:
+    """A .trc and its .mot with the same entities are one trial; a session and a condition are kept; events are found."""
+    folder = tmp_path / "raw" / "sub-A1" / "ses-b"
+    stem = "sub-A1_ses-b_task-lateral_acq-held_run-02"
+    touch(folder / f"{stem}.trc", folder / f"{stem}.mot", folder / f"{stem}_events.tsv")
+    (trial,) = find(tmp_path).trials
+    assert (trial.trial, trial.subject, trial.session, trial.task, trial.condition, trial.run) == (
+        stem, "sub-A1", "b", "lateral", "held", "02",
+    )  # fmt: skip
+    assert [f.suffix for f in trial.files] == [".mot", ".trc"]
+    assert trial.events is not None
+    assert Trial.of(trial.plain()) == trial
+
+
+@pytest.mark.parametrize(
+    "stem", ["walk01", "sub-01", "sub-01_run-1_task-a", "sub-01_task-a_foo-1", "sub-_task-a", "task-a_sub-01"]
+)
+def test_names_that_are_not_bids(stem: str) -> None:
+    """Free names, unknown or misplaced entities are not guessed at."""
+    assert entities(stem) is None
+
+
+def test_nothing_is_passed_over(tmp_path: Path) -> None:
+    """Every file is a trial, a side file, or named among the exclusions, a .mat and a nested one too."""
+    raw = tmp_path / "raw"
+    touch(raw / "walk.c3d", raw / "deep" / "er" / "x.mat", raw / "README.md", raw / "sub-01" / "sub-01_task-quiet_run-1.c3d")
+    study = find(tmp_path)
+    assert {e.file: e.reason for e in study.exclusions} == {"walk.c3d": "not_named", str(Path("deep/er/x.mat")): "not_named"}
+    assert [t.trial for t in study.trials] == ["sub-01_task-quiet_run-1"]
+
+
+def test_recordings_table_names_files(tmp_path: Path) -> None:
+    """recordings.tsv stands in for names; a listed file that is absent and an unlisted one are both said."""
+    touch(tmp_path / "raw" / "a b.c3d", tmp_path / "raw" / "other.c3d")
+    (tmp_path / "recordings.tsv").write_text(
+        "file\tparticipant_id\tsession\ttask\tacq\trun\na b.c3d\tsub-07\t\tquiet\tn/a\t1\ngone.c3d\t7\t\tquiet\t\t2\n"
+    )
+    study = find(tmp_path)
+    assert [t.trial for t in study.trials] == ["sub-07_task-quiet_run-1"]
+    assert {e.file: e.reason for e in study.exclusions} == {"gone.c3d": "missing_file", "other.c3d": "not_listed"}
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("id\tmass_kg\n1\t70\n", "no column 'participant_id'"),
+        ("participant_id\tmass_kg\n1\t70000\n", "is the unit right"),
+        ("participant_id\tmass_kg\n1\tseventy\n", "line 2, column mass_kg"),
+        ("participant_id\tsex\n1\tQ\n", "column sex"),
+        ("participant_id\tsex\n1\tF\nsub-1\tF\n", "twice"),
+    ],
+)
+def test_a_broken_participants_table_stops(tmp_path: Path, text: str, said: str) -> None:
+    """The message names file, line, column and what to do."""
+    touch(tmp_path / "raw" / "sub-1_task-a.c3d")
+    (tmp_path / "raw" / "participants.tsv").write_text(text)
+    with pytest.raises(PlumblineError, match=said):
+        find(tmp_path)
+
+
+def test_ids_with_and_without_sub_are_the_same_person(tmp_path: Path) -> None:
+    """`1` and `sub-1` meet; n/a is no number."""
+    touch(tmp_path / "raw" / "sub-1_task-a.c3d")
+    (tmp_path / "raw" / "participants.tsv").write_text(
+        "participant_id\tmass_kg\theight_m\tsex\textra\n1\tn/a\t1.8\tfemale\thello\n"
+    )
+    person = find(tmp_path).participants["sub-1"]
+    assert (person.mass, person.height, person.sex) == (None, 1.8, "F")
+
+
+@given(st.sets(st.integers(0, 999), min_size=1, max_size=60), st.integers(0, 999), st.integers(1, 9))
+def test_inserting_a_subject_changes_one_part(numbers: set[int], new: int, size: int) -> None:
+    """Whoever comes in, at most one part holds other subjects than before, and no part is too large."""
+    before = assign([f"sub-{i:03d}" for i in numbers], size)
+    after = assign([f"sub-{i:03d}" for i in numbers | {new}], size, before)
+
+    def content(parts: dict[str, str]) -> dict[str, set[str]]:
+        return {p: {s for s in parts if parts[s] == p} for p in parts.values()}
+
+    changed = [p for p, who in content(after).items() if content(before).get(p) != who]
+    assert len(changed) == (0 if new in numbers else 1)
+    assert max(len(who) for who in content(after).values()) <= size
+
+
+def test_a_cohort_is_hundreds_of_parts() -> None:
+    """1,000 subjects at the default of 8 are 125 parts: with five stages and a figure job, 750 jobs."""
+    assert len(set(assign([f"sub-{i:04d}" for i in range(1000)], 8).values())) == 125
