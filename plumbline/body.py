@@ -142,18 +142,14 @@ def build(markers: Mapping[str, Array], markerset: MarkerSet, sex: str) -> Body:
     A segment never seen is named in `missing` with its markers; one missing in some frames only is bridged.
     """
     have = points(markers, markerset)
-    found = [
-        (s, mean(s.proximal, have), mean(s.distal, have)) for s in markerset.segments if set(s.markers) <= set(have)
-    ]
+    found = [(s, mean(s.proximal, have), mean(s.distal, have)) for s in markerset.segments if set(s.markers) <= set(have)]
     found = [(s, a, b) for s, a, b in found if np.isfinite(a + b).all(axis=1).any()]
     names = {s.name for s, _, _ in found}
     missing = [_lack(s, have, markerset) for s in markerset.segments if s.name not in names]
     n = len(next(iter(markers.values()))) if markers else 0
     a = np.stack([f[1] for f in found], axis=1) if found else np.zeros((n, 0, 3))
     b = np.stack([f[2] for f in found], axis=1) if found else np.zeros((n, 0, 3))
-    body = Body(
-        [s.name for s, _, _ in found], [s.numbers(sex) for s, _, _ in found], a, b, np.zeros(n, bool), missing, []
-    )
+    body = Body([s.name for s, _, _ in found], [s.numbers(sex) for s, _, _ in found], a, b, np.zeros(n, bool), missing, [])
     _bridge(body)
     if sex == "" and any(s.table for s, _, _ in found):
         body.notes.append("sex not stated in participants.tsv: segment numbers are the mean of both sexes")
@@ -196,9 +192,7 @@ def _bridge(body: Body) -> None:
     body.filled |= usable & ~seen[:, gappy].all(axis=1)
     for s in np.flatnonzero(gappy):
         lost = int((usable & ~seen[:, s]).sum())
-        body.notes.append(
-            f"{body.names[s]} is not seen in {lost} frames: kept in place relative to the other segments there"
-        )
+        body.notes.append(f"{body.names[s]} is not seen in {lost} frames: kept in place relative to the other segments there")
 
 
 def _carried(offset: Array, known: Mask) -> Array:

@@ -103,7 +103,7 @@ def _row(chosen: Sequence[tuple[Windows, NDArray[np.int64]]], level: str, about:
     got = solve(chosen, blocks=alone)
     if got is None:
         return
-    low, high = got.omega_interval()
+    low, high = got.omega_interval() if got.w2 > 0 else (float("nan"), float("nan"))
     height = np.average([w.plant.height for w, i in chosen], weights=[max(len(i), 1) for _, i in chosen])
     at_height = float(np.sqrt(G / height)) if height > 0 else float("nan")
     first = chosen[0][0]

@@ -8,6 +8,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from plumbline.plant import AXES
+from plumbline.tables import TABLES
 
 Array = NDArray[np.float64]
 
@@ -28,7 +29,7 @@ def ladder(heldout: pd.DataFrame) -> pd.DataFrame:
         for task, subject, condition, group in _groups(mine):
             key = {"axis": axis, "task": task, "subject": subject, "condition": condition}
             rows += [{"ledger": "plant", **key, "model": "base", "effects": "", **r} for r in rungs(group)]
-    return pd.DataFrame(rows)
+    return pd.DataFrame(rows, columns=[c.name for c in TABLES["ladder"]])
 
 
 def _groups(table: pd.DataFrame) -> Iterator[tuple[str, str, str, pd.DataFrame]]:
@@ -124,7 +125,9 @@ def _why_no_error(coverage: pd.DataFrame) -> str:
     judged = coverage[coverage["com_method"] != "none"]
     if judged.empty:
         return "no trial has a CoM; " + "; ".join(sorted(set(coverage["limitation"]) - {""}))
-    return f"{len(judged)} trial with a CoM and a ZMP; at least two of one subject are needed to leave one out"
+    if judged.groupby("subject")["trial"].nunique().max() < 2:
+        return "one trial with a CoM and a ZMP per subject; at least two of one subject are needed to leave one out"
+    return "w2 cannot be told on this axis: the CoM hardly moves against the ZMP there"
 
 
 def _why_no_floor(coverage: pd.DataFrame) -> str:

@@ -68,9 +68,7 @@ SCHEMA = _map(
     aliases={"type": "object", "additionalProperties": _LABELS},
     points={"type": "object", "additionalProperties": _POINT},
     segments={"type": "object", "minProperties": 1, "additionalProperties": _SEGMENT},
-    support=_map(
-        ["left", "right"], left=_LABELS, right=_LABELS, half_width={"type": "number", "minimum": 0, "maximum": 0.3}
-    ),
+    support=_map(["left", "right"], left=_LABELS, right=_LABELS, half_width={"type": "number", "minimum": 0, "maximum": 0.3}),
 )
 
 
@@ -212,9 +210,7 @@ def _segment(source: str, key: str, spec: Mapping[str, Any], notes: list[str]) -
     lacks = [k for k in ("mass", "com", "gyration") if k not in spec]
     if lacks:
         raise PlumblineError(f"{where}, key '{lacks[0]}': missing; give mass, com and gyration, or a table")
-    values = Numbers(
-        float(spec["mass"]), float(spec["com"]), float(spec["gyration"]), float(spec["gyration"]), float("nan")
-    )
+    values = Numbers(float(spec["mass"]), float(spec["com"]), float(spec["gyration"]), float(spec["gyration"]), float("nan"))
     notes += landmarks.lookalike(where, *ends, values)
     return Segment(key, *ends, own=values)
 
@@ -229,9 +225,7 @@ def _check_points(source: str, points: Mapping[str, Mapping[str, Any]]) -> None:
 def _validate(raw: Any, source: str) -> None:
     if not isinstance(raw, dict):
         raise PlumblineError(f"{source}: holds no map; a marker set starts with 'segments:'")
-    problems = sorted(
-        jsonschema.Draft202012Validator(SCHEMA).iter_errors(raw), key=lambda e: [str(p) for p in e.absolute_path]
-    )
+    problems = sorted(jsonschema.Draft202012Validator(SCHEMA).iter_errors(raw), key=lambda e: [str(p) for p in e.absolute_path])
     if problems:
         raise PlumblineError("; ".join(f"{source}{_place(e)}: {_reason(e)}" for e in problems))
 
@@ -249,7 +243,5 @@ def _reason(error: Any) -> str:
         known = list(error.schema.get("properties", {}))
         unknown = sorted(str(k) for k in set(error.instance) - set(known))
         near = get_close_matches(unknown[0], known, n=1, cutoff=0.5)
-        return f"unknown key '{unknown[0]}'; " + (
-            f"did you mean '{near[0]}'?" if near else f"known: {', '.join(known)}"
-        )
+        return f"unknown key '{unknown[0]}'; " + (f"did you mean '{near[0]}'?" if near else f"known: {', '.join(known)}")
     return str(error.message)

@@ -107,9 +107,7 @@ def choose(head: Header, stated: Layout, counts: list[int]) -> Layout | None:
     """
     channels = head.analogs // head.per_frame if head.per_frame else 0
     layouts = [stated, Layout(head.points, channels, head.per_frame)]
-    fits = [
-        (layout._replace(frames=frames), snug) for layout in layouts for frames, snug in [_fit(head, layout, counts)]
-    ]
+    fits = [(layout._replace(frames=frames), snug) for layout in layouts for frames, snug in [_fit(head, layout, counts)]]
     for want_snug in (True, False):
         for layout, snug in fits:
             if layout.frames and (snug or (not want_snug and layout.frames == max(counts))):
@@ -179,21 +177,36 @@ class Parameters:
 
 
 def damage(path: Path, head: Header) -> str:
-    """What is wrong in the chain of the parameter section, in words; empty where it holds together."""
+    """What is wrong in the chain of groups and parameters, in words; empty where it holds together."""
     with path.open("rb") as file:
         file.seek(head.parameters)
         data = file.read(255 * BLOCK)
     at, groups = 4, dict[int, str]()
     while at + 2 < len(data):
-        length, number = (
-            abs(int(np.int8(data[at : at + 1].view() if False else np.frombuffer(data, "i1", 1, at)[0]))),
-            0,
-        )
-        number = int(np.frombuffer(data, "i1", 1, at + 1)[0])
+        length, number = (int(n) for n in np.frombuffer(data, "i1", 2, at))
         if length == 0:
             return ""
-        name = data[at + 2 : at + 2 + length].decode("latin-1")
-        groups[number] = name
-        at += 2 + length
-        break
-    return ""
+        name = data[at + 2 : at + 2 + abs(length)].decode("latin-1")
+        link = at + 2 + abs(length)
+        if not name.isprintable() or link + 5 > len(data):
+            return f"at byte {head.parameters + at} stands no name"
+        step = int(np.frombuffer(data, "<i2", 1, link)[0])
+        if number < 0:
+            groups[-number] = name
+        fault = _parameter_fault(data, link, step) if number > 0 else ""
+        if step < 0 or fault:
+            return f"{groups.get(number, number)}:{name} {fault or 'points backwards'}"
+        if step == 0:
+            return ""
+        at = link + step
+    return "the chain of parameters leaves the section"
+
+
+def _parameter_fault(data: bytes, link: int, step: int) -> str:
+    """What is wrong with the parameter whose link to the next entry stands at byte `link`."""
+    kind, dimensions = int(np.frombuffer(data, "i1", 1, link + 2)[0]), data[link + 3]
+    if kind not in (-1, 1, 2, 4):
+        return f"is of the unknown type {kind}"
+    sizes = np.frombuffer(data[link + 4 : link + 4 + dimensions], "u1").astype(float)
+    end = link + 4 + dimensions + abs(kind) * float(np.prod(sizes))
+    return "runs over the next entry" if end > (link + step if step > 0 else len(data)) else ""

@@ -52,9 +52,7 @@ def decode(path: Path) -> tuple[list[str], bool, list[str]]:
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         text = data.decode("utf-16", errors="replace")
     elif b"\0" in data[:65536]:
-        raise Refused(
-            "unreadable", f"{path.name} is a binary file, not text", "export it as text, or give it its true ending"
-        )
+        raise Refused("unreadable", f"{path.name} is a binary file, not text", "export it as text, or give it its true ending")
     else:
         try:
             text = data.decode("utf-8-sig")
@@ -103,9 +101,7 @@ def _check_last_line(counts: list[int], ended: bool, name: str, stated: int | No
     """
     usual = counts[-2] if len(counts) > 1 else counts[-1]
     short = counts[-1] < usual
-    cut = (not ended and (short or (stated is not None and len(counts) < stated))) or (
-        short and (usual - counts[-1]) % 3 != 0
-    )
+    cut = (not ended and (short or (stated is not None and len(counts) < stated))) or (short and (usual - counts[-1]) % 3 != 0)
     if cut:
         rows = f" of {stated}" if stated is not None else ""
         raise Refused(
@@ -197,16 +193,24 @@ def rate_of(time: Array, name: str) -> float:
     if time.size < 2:
         return float("nan")
     mean = (time.size - 1) / (time[-1] - time[0])
-    return float(mean if is_even(time) else 1.0 / np.median(steps))
+    rate = mean if is_even(time) else 1.0 / np.median(steps)
+    return float(f"{rate:.9g}")  # 1000, not 1000.0000000000001
 
 
 def is_even(time: Array) -> bool:
-    """Whether the time stamps lie on a straight line within :data:`JITTER` of an interval."""
+    """Whether the time stamps lie on a straight line within :data:`JITTER` of an interval, rounding of the stamps allowed."""
     if time.size < 3:
         return True
     index = np.arange(time.size)
     slope, start = np.polyfit(index, time - time[0], 1)
-    return bool(np.max(np.abs(time - time[0] - start - slope * index)) <= JITTER * slope)
+    off = float(np.max(np.abs(time - time[0] - start - slope * index)))
+    return bool(off <= JITTER * slope + 0.51 * _resolution(time))
+
+
+def _resolution(time: Array) -> float:
+    """Last decimal that the time stamps carry [s], e.g. 0.001 for stamps in whole milliseconds."""
+    some = time[:200]
+    return next((10.0**-d for d in range(7) if np.allclose(some * 10**d, np.round(some * 10**d), atol=1e-6, rtol=0)), 0.0)
 
 
 def chosen_rate(stated: float | None, time: Array, name: str, notes: list[str]) -> float:

@@ -1,7 +1,7 @@
 r"""The paper's closed loop with prescribed omega, gains and limits: loci whose truth is known, for tests of estimators.
 
 Plant :math:`\ddot x = \omega^2 (x - p)`, law :math:`p = \mathrm{clip}(d + k_1 (x - d) + k_2 \dot x + \eta, p_L, p_R)`
-(Murai 2013, eqs. 1 and 5), with Ornstein-Uhlenbeck feedback noise :math:`\eta` and, if wanted, the state taken a delay
+(Murai 2013), with Ornstein-Uhlenbeck feedback noise :math:`\eta` and, if wanted, the state taken a delay
 earlier. All loci are integrated at once by fourth-order Runge-Kutta steps of at most 1 ms. Without noise and delay x agrees
 with the closed forms (:math:`\cosh, \sinh` while saturated, the matrix exponential while not) to 1e-12 m per second away from the
 limits; each crossing of a limit, where p has a kink, adds up to 1e-7 m/s to the velocity.
@@ -161,9 +161,7 @@ def _integrate(loop: _Loop, state: Array, noise: Array, step: float) -> tuple[Ar
 def _past(loop: _Loop, x: Array, v: Array, start: Array, step: float) -> Callable[[int], Array]:
     """The state `delay` before a half step, by cubic Hermite interpolation of the nodes passed; shape (2, n)."""
     if loop.delay < step:
-        raise ValueError(
-            f"a delay of {loop.delay} s is shorter than the integration step of {step} s; use 0 or a longer one"
-        )
+        raise ValueError(f"a delay of {loop.delay} s is shorter than the integration step of {step} s; use 0 or a longer one")
 
     def state(half: int) -> Array:
         t = half / 2 - loop.delay / step
