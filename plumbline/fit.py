@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from plumbline.models.com_zmp import PlantFit, fit, free_run, zmp_error
+from plumbline.models.com_zmp import Noise, PlantFit, fit, free_run, zmp_error
 from plumbline.physics import G
 from plumbline.plant import AXES, Plant, of_trials
 
@@ -129,7 +129,8 @@ def solve(chosen: Sequence[tuple[Windows, NDArray[np.int64]]], *, blocks: bool =
     acceleration = np.concatenate([w.plant.acceleration[i] for w, i in chosen])
     lever = np.concatenate([w.plant.lever[i] for w, i in chosen])
     cluster = np.concatenate([k * 1_000_000 + _pieces(w, i, blocks) for k, (w, i) in enumerate(chosen)])
-    return fit(acceleration, lever, cluster)
+    noise = [w.plant.noise_in_regression(len(i)) for w, i in chosen]
+    return fit(acceleration, lever, cluster, Noise(*(np.concatenate(column) for column in zip(*noise, strict=True))))
 
 
 def _pieces(w: Windows, index: NDArray[np.int64], blocks: bool) -> NDArray[np.int64]:

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from plumbline.models.com_zmp import Noise
 from plumbline.physics import G
 from plumbline.weak import Bump, white_noise_sd
 
@@ -80,6 +81,12 @@ class Plant:
     def rejected(self) -> int:
         """Test functions of the same grid that met a push, a gap or an end."""
         return len(range(0, len(self.x), max(1, round(STRIDE * self.rate)))) - len(self.picked)
+
+    def noise_in_regression(self, count: int) -> Noise:
+        """What sensor noise adds to the regression of x'' on x - p, for `count` windows; zeros where the noise is not known."""
+        f, f2 = self.bump.value, self.bump.curvature
+        x2, p2 = np.nan_to_num(self.noise_x) ** 2, np.nan_to_num(self.noise_p) ** 2
+        return Noise(np.full(count, (x2 + p2) * (f @ f)), np.full(count, x2 * (f @ f2)))
 
     def noise_variance(self, w2: float) -> float:
         """Variance [m2] of the error (x - p) - x''/w2 that white sensor noise alone gives; NaN where the noise is not known."""
