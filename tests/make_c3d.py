@@ -72,9 +72,7 @@ def write_c3d(
     start = 2 + len(_section(merged, processor)) // BLOCK
     merged["POINT"]["DATA_START"] = start
     head = bytearray(BLOCK)
-    struct.pack_into(
-        "<BBHHHHHfHHf", head, 0, 2, 0x50, m, channels * per_frame, first, first + n - 1, 0, -1.0, start, per_frame, rate
-    )
+    struct.pack_into("<BBHHHHHfHHf", head, 0, 2, 0x50, m, channels * per_frame, first, first + n - 1, 0, -1.0, start, per_frame, rate)
     for index, value in (header or {}).items():
         struct.pack_into("<H", head, 2 * index, value)
     path.write_bytes(bytes(head) + _section(merged, processor) + data)

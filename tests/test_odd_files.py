@@ -1,7 +1,6 @@
 """All odd, broken and unusual public files: each is read or refused as the committed table `odd_files.tsv` expects."""
 
 import csv
-import resource
 import sys
 from pathlib import Path
 from typing import Any
@@ -49,6 +48,8 @@ def test_every_odd_file_is_in_the_table(shared_data: Path, folder: str) -> None:
 @pytest.mark.skipif(sys.platform != "linux", reason="peak memory in kB as Linux counts it")
 def test_no_process_takes_more_than_a_gigabyte_and_a_half(shared_data: Path) -> None:
     """The file that makes the bare library take 12.6 GB is refused with neither the child nor this process above 1.5 GB."""
+    import resource  # not on Windows
+
     path = shared_data / "c3d_odd" / "sample18_bad_parameter_section.c3d"
     with pytest.raises(Refused, match="damaged"):
         read_file(path)

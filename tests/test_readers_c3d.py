@@ -176,10 +176,7 @@ def _equal(ours: np.ndarray, theirs: np.ndarray) -> bool:
 
 def _follows(ours: np.ndarray, theirs: np.ndarray) -> bool:
     rest = iter(range(theirs.shape[1]))
-    return all(
-        any(np.allclose(ours[:, i], theirs[:, j], rtol=1e-5, atol=1e-6, equal_nan=True) for j in rest)
-        for i in range(ours.shape[1])
-    )
+    return all(any(np.allclose(ours[:, i], theirs[:, j], rtol=1e-5, atol=1e-6, equal_nan=True) for j in rest) for i in range(ours.shape[1]))
 
 
 def test_child_returns_what_the_function_returns_and_raises_its_refusal(tmp_path: Path) -> None:

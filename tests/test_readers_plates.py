@@ -224,8 +224,40 @@ def test_markers_equal_those_that_opensim_extracts(shared_data: Path) -> None:
 def test_forces_follow_those_of_the_libraries_helper(shared_data: Path, name: str) -> None:
     """Types 2 and 4: up to the baseline the force equals that of ezc3d's own plate helper."""
     raw = c3d.read(shared_data / name)
-    for plate, theirs in zip(
-        raw.plates, ezc3d.c3d(str(shared_data / name), extract_forceplat_data=True)["data"]["platform"], strict=True
-    ):
+    for plate, theirs in zip(raw.plates, ezc3d.c3d(str(shared_data / name), extract_forceplat_data=True)["data"]["platform"], strict=True):
         difference = plate.force - theirs["force"].T
         np.testing.assert_allclose(difference, np.broadcast_to(difference[0], difference.shape), atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        ("c3d_odd/sample28_type1.C3D", "type-1"),
+        ("c3d_odd/sample02_pc_real.c3d", "type-2"),
+        ("c3d_wholebody/FunctionalWalk.c3d", "type-2"),
+        ("c3d_odd/sample_27_kyowadengyo.c3d", "type-3"),
+        ("c3d_wholebody/Walking_Hybrid_1_1.c3d", "type-3"),
+        ("bmc/Gait.c3d", "type-4"),
+        ("c3d_wholebody/Walk1.c3d", "type-4"),
+    ],
+)
+def test_pressure_lies_under_a_foot(shared_data: Path, name: str, kind: str) -> None:
+    """Real gait on every plate type: while a plate carries 100 N its centre of pressure is within 0.1 m of a low marker."""
+    raw = c3d.read(shared_data / name)
+    for plate in raw.plates:
+        assert plate.kind == kind
+        assert np.quantile(_foot_distance(raw, plate), 0.95) < 0.1
+
+
+def _foot_distance(raw: Raw, plate: RawPlate) -> np.ndarray:
+    """Distance along the surface from the centre of pressure to the nearest marker within 0.25 m of it [m], loaded frames."""
+    assert plate.corners is not None
+    normal = np.cross(plate.corners[0] - plate.corners[2], plate.corners[1] - plate.corners[3])
+    normal /= np.linalg.norm(normal)
+    rows = np.searchsorted(plate.time, raw.time - 1e-9).clip(0, len(plate.time) - 1)
+    load = plate.force[rows] @ normal
+    loaded = np.abs(load) > 100
+    cop = plate.origin + np.cross(normal, plate.moment[rows[loaded]]) / load[loaded, None]
+    away, height = raw.points[loaded] - cop[:, None], np.abs((raw.points[loaded] - plate.origin) @ normal)
+    along = away - (away @ normal)[..., None] * normal
+    return np.min(np.where(height < 0.25, np.linalg.norm(along, axis=2), np.inf), axis=1)

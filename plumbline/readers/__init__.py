@@ -1,8 +1,8 @@
 """Readers of recordings: one file in, one :class:`plumbline.readers.raw.Raw` out, in SI and the lab's own axes."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from plumbline.errors import Refused
 from plumbline.readers.raw import Raw
@@ -13,10 +13,10 @@ KISTLER = b"CPlateEight"  # BioWare writes its classes by name near the top
 EXPORT = "export the recording as C3D, TRC + MOT or delimited text"
 
 
-def read_file(path: Path, columns: Mapping[str, Any] | None = None) -> Raw:
+def read_file(path: Path, columns: Sequence[Mapping[str, Any]] = ()) -> Raw:
     """Read one recording by its ending; C3D in a child process with limits on memory and time.
 
-    columns: the config's mapping of text and parquet columns.  Raises Refused with the reason, whatever the file holds.
+    columns: the config's entries for text and parquet files.  Raises Refused with the reason, whatever the file holds.
     """
     ending = path.suffix.lower()
     if not path.is_file():
@@ -26,7 +26,7 @@ def read_file(path: Path, columns: Mapping[str, Any] | None = None) -> Raw:
     if ending == ".c3d":
         from plumbline.readers import child
 
-        return child.guarded("plumbline.readers.c3d:read", path)
+        return cast(Raw, child.guarded("plumbline.readers.c3d:read", path))
     if ending in OPENSIM:
         from plumbline.readers import opensim
 

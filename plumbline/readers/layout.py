@@ -136,10 +136,8 @@ def decode(path: Path, head: Header, layout: Layout) -> tuple[Array, Array]:
     with path.open("rb") as file:
         file.seek(head.start)
         data = file.read(layout.frames * _frame_bytes(head, layout))
-    if head.scale < 0:
-        values = _reals(np.frombuffer(data, "<u2"), head.processor == DEC)
-    else:
-        values = np.frombuffer(data, "<i2").astype(float)
+    real = head.scale < 0
+    values = _reals(np.frombuffer(data, "<u2"), head.processor == DEC) if real else np.frombuffer(data, "<i2").astype(float)
     values = values.reshape(layout.frames, layout.words)
     points = values[:, : 4 * layout.points].reshape(layout.frames, layout.points, 4)
     return points, values[:, 4 * layout.points :].reshape(layout.frames * layout.per_frame, layout.channels)
