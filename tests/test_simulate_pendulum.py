@@ -80,9 +80,11 @@ def test_start_states_are_of_the_kind_asked_for() -> None:
             if kind != "unsaturated":
                 assert side * x.p_true[0] == pytest.approx(0.1)
             if kind == "falling":
-                assert np.abs(x.x_true).max() <= 0.3 and side * x.x_true[-1] > 0.28
+                assert np.abs(x.x_true).max() <= 0.3
+                assert side * x.x_true[-1] > 0.28
             else:
-                assert abs(x.x_true[-1]) < 0.02 and x.time[-1] == pytest.approx(4.0)
+                assert abs(x.x_true[-1]) < 0.02
+                assert x.time[-1] == pytest.approx(4.0)
 
 
 def test_both_sides_and_a_shifted_reference() -> None:
@@ -91,7 +93,8 @@ def test_both_sides_and_a_shifted_reference() -> None:
     assert 15 <= sum(x.side == "left" for x in all_loci) <= 45
     for x in all_loci:
         assert x.x_true[-1] == pytest.approx(0.03, abs=1e-3)
-        assert -0.08 <= x.p_true.min() and x.p_true.max() <= 0.12
+        assert x.p_true.min() >= -0.08
+        assert x.p_true.max() <= 0.12
 
 
 def test_sensor_noise_has_its_size() -> None:
@@ -140,7 +143,7 @@ def test_a_seed_gives_the_same_loci_and_another_others() -> None:
 
 def test_what_cannot_be_simulated_is_refused() -> None:
     """A delay below the step and a start that does not exist stop with the numbers in the message."""
-    with pytest.raises(ValueError, match="0.0004 s is shorter than the integration step"):
+    with pytest.raises(ValueError, match=r"0\.0004 s is shorter than the integration step"):
         loci(1, **NEAR, delay=4e-4, seed=1)
     with pytest.raises(ValueError, match="no saturated start state exists"):
         loci(4, omega=2.7, k1=0.1, k2=0.01, seed=1)
