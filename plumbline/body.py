@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from plumbline.markerset import MarkerSet, Segment
+from plumbline.filters import known
+from plumbline.markerset import MarkerSet, Segment, point_inputs
 from plumbline.segments import Numbers
 
 Array = NDArray[np.float64]
@@ -45,7 +46,8 @@ class Body:
         return float(sum(n.mass for n in self.numbers))
 
     @property
-    def _mass(self) -> Array:
+    def masses(self) -> Array:
+        """Mass share of each segment [1], shape (s,)."""
         return np.array([n.mass for n in self.numbers])
 
     def centres(self) -> Array:
@@ -58,7 +60,7 @@ class Body:
         n = len(self.proximal)
         if self.share < MIN_MASS - 1e-9:
             return np.full((n, 3), np.nan)
-        return np.asarray(np.einsum("nsk,s->nk", self.centres(), self._mass) / self.share)
+        return np.asarray(np.einsum("nsk,s->nk", self.centres(), self.masses) / self.share)
 
     def angular_momentum(self, time: Array, mass: float) -> Array:
         r"""Angular momentum about the CoM [kg m2/s], shape (n, 3).
@@ -66,12 +68,12 @@ class Body:
         :math:`L = \sum_i m_i (r_i - c) \times (v_i - \dot c) + I_i \Omega_i`; velocities by central differences of the positions
         as they are. Segment masses are shares of `mass` [kg]; what has no segment is left out.
         """
-        r = self.centres()
-        r = r - np.einsum("nsk,s->nk", r, self._mass)[:, None] / self.share
-        if len(time) < 2 or not self.numbers:
+        if len(time) < 2 or self.share < MIN_MASS - 1e-9:
             return np.full((len(time), 3), np.nan)
+        r = self.centres()
+        r = r - np.einsum("nsk,s->nk", r, self.masses)[:, None] / self.share
         v = np.gradient(r, time, axis=0)
-        return np.asarray(mass * (np.einsum("nsk,s->nk", np.cross(r, v), self._mass) + self._spin(time)))
+        return np.asarray(mass * (np.einsum("nsk,s->nk", np.cross(r, v), self.masses) + self._spin(time)))
 
     def _spin(self, time: Array) -> Array:
         """Sum of the segments' own angular momenta per body mass [m2/s], shape (n, 3).
@@ -88,7 +90,7 @@ class Body:
         about = s * np.einsum("nsk,nsk->ns", omega, s)[..., None] / np.where(norm2 > 0.05, norm2, np.inf)
         ks, kt = (np.array([getattr(n, a) for n in self.numbers])[:, None] for a in ("sagittal", "transverse"))
         spin = length**2 * (kt**2 * omega + (ks**2 - kt**2) * about)
-        return np.asarray(np.einsum("nsk,s->nk", spin, self._mass))
+        return np.asarray(np.einsum("nsk,s->nk", spin, self.masses))
 
 
 def points(markers: Mapping[str, Array], markerset: MarkerSet) -> dict[str, Array]:
@@ -143,7 +145,7 @@ def build(markers: Mapping[str, Array], markerset: MarkerSet, sex: str) -> Body:
     """
     have = points(markers, markerset)
     found = [(s, mean(s.proximal, have), mean(s.distal, have)) for s in markerset.segments if set(s.markers) <= set(have)]
-    found = [(s, a, b) for s, a, b in found if np.isfinite(a + b).all(axis=1).any()]
+    found = [(s, a, b) for s, a, b in found if known(a + b).any()]
     names = {s.name for s, _, _ in found}
     missing = [_lack(s, have, markerset) for s in markerset.segments if s.name not in names]
     n = len(next(iter(markers.values()))) if markers else 0
@@ -151,7 +153,7 @@ def build(markers: Mapping[str, Array], markerset: MarkerSet, sex: str) -> Body:
     b = np.stack([f[2] for f in found], axis=1) if found else np.zeros((n, 0, 3))
     body = Body([s.name for s, _, _ in found], [s.numbers(sex) for s, _, _ in found], a, b, np.zeros(n, bool), missing, [])
     _bridge(body)
-    if sex == "" and any(s.table for s, _, _ in found):
+    if sex == "" and body.share >= MIN_MASS and any(s.table for s, _, _ in found):
         body.notes.append("sex not stated in participants.tsv: segment numbers are the mean of both sexes")
     if missing and body.share >= MIN_MASS:
         body.notes.append(f"the CoM leaves out {1.0 - body.share:.1%} of body mass that has no segment")
@@ -160,7 +162,7 @@ def build(markers: Mapping[str, Array], markerset: MarkerSet, sex: str) -> Body:
 
 def _lack(segment: Segment, have: Mapping[str, Array], markerset: MarkerSet) -> str:
     def gone(name: str) -> list[str]:
-        if name in have and np.isfinite(have[name]).all(axis=1).any():
+        if name in have and known(have[name]).any():
             return []
         inputs = markerset.points.get(name, {})
         sources = [s for key, value in inputs.items() if isinstance(value, list) for s in value if key != "share"]
@@ -176,25 +178,49 @@ def _bridge(body: Body) -> None:
     Dropping it for some frames only would make the CoM jump. In a frame where segments of less than `MIN_MASS` are seen, all are
     set to NaN.
     """
-    seen = np.isfinite(body.proximal + body.distal).all(axis=2)
-    usable = seen @ body._mass >= MIN_MASS - 1e-9
-    steady = seen[usable].all(axis=0)
-    gappy = ~steady & seen[usable].any(axis=0)
-    if not usable.any() or not steady.any():
-        usable = seen.all(axis=1)
-        gappy[:] = False
-    m = body._mass * steady
-    anchor = np.einsum("nsk,s->nk", np.nan_to_num(body.centres()), m)[:, None] / max(m.sum(), 1e-12)
-    for ends in (body.proximal, body.distal):
-        for s in np.flatnonzero(gappy):
-            ends[:, s] = anchor[:, 0] + _carried(ends[:, s] - anchor[:, 0], seen[:, s] & usable)
-        ends[~usable] = np.nan
-    body.filled |= usable & ~seen[:, gappy].all(axis=1)
+    _drop_unusable(body)
+    seen = known(body.proximal + body.distal)
+    usable = np.asarray(seen @ body.masses >= MIN_MASS - 1e-9)
+    steady = np.asarray(seen[usable].all(axis=0))
+    gappy = ~steady if usable.any() and steady.any() else np.zeros(len(steady), dtype=bool)
+    usable &= np.asarray(seen[:, ~gappy].all(axis=1))
+    m = body.masses * steady
+    anchor = np.einsum("nsk,s->nk", np.nan_to_num(body.centres()), m) / max(m.sum(), 1e-12)
     for s in np.flatnonzero(gappy):
-        lost = int((usable & ~seen[:, s]).sum())
-        body.notes.append(f"{body.names[s]} is not seen in {lost} frames: kept in place relative to the other segments there")
+        there = seen[:, s] & usable
+        for ends in (body.proximal, body.distal):
+            ends[:, s] = anchor + _carried(ends[:, s] - anchor, there)
+        body.notes.append(
+            f"{body.names[s]} is not seen in {int((usable & ~there).sum())} frames: kept in place relative to the other segments there"
+        )
+    body.proximal[~usable] = body.distal[~usable] = np.nan
+    body.filled |= usable & ~np.asarray(seen.all(axis=1))
 
 
-def _carried(offset: Array, known: Mask) -> Array:
+def _drop_unusable(body: Body) -> None:
+    """Leave out segments that are only seen in frames where too little of the rest is."""
+    seen = known(body.proximal + body.distal)
+    usable = seen @ body.masses >= MIN_MASS - 1e-9
+    keep = np.asarray(seen[usable].any(axis=0)) if usable.any() else np.ones(len(body.names), dtype=bool)
+    body.missing += [f"{name} (never seen together with the rest)" for name, k in zip(body.names, keep, strict=True) if not k]
+    body.names = [name for name, k in zip(body.names, keep, strict=True) if k]
+    body.numbers = [number for number, k in zip(body.numbers, keep, strict=True) if k]
+    body.proximal, body.distal = body.proximal[:, keep], body.distal[:, keep]
+
+
+def _carried(offset: Array, there: Mask) -> Array:
     where = np.arange(len(offset))
-    return np.stack([np.interp(where, where[known], offset[known, k]) for k in range(3)], axis=1)
+    return np.stack([np.interp(where, where[there], offset[there, k]) for k in range(3)], axis=1)
+
+
+def inputs(markerset: MarkerSet, names: list[str]) -> set[str]:
+    """Markers (under the set's names) that the named segments are made of, through made points."""
+    todo = [m for s in markerset.segments if s.name in names for m in s.markers]
+    out: set[str] = set()
+    while todo:
+        name = todo.pop()
+        if name in out:
+            continue
+        out.add(name)
+        todo += point_inputs(markerset.points.get(name, {}))
+    return out

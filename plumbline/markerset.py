@@ -20,6 +20,7 @@ A set is a YAML file::
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -107,10 +108,11 @@ class MarkerSet:
     def resolve(self, labels: Iterable[str]) -> dict[str, str]:
         """Marker name in the set -> label in the file (subject prefixes dropped, aliases tried)."""
         have = landmarks.base_names(labels)
-        found = {name: have[name] for name in have}
+        found = dict(have)
         for name, others in self.aliases.items():
-            if name not in found:
-                found.update({name: have[o] for o in others if o in have})
+            other = next((have[o] for o in others if o in have), None)
+            if name not in found and other is not None:
+                found[name] = other
         return found
 
     def available(self, labels: Iterable[str]) -> set[str]:
@@ -137,6 +139,7 @@ def built_in() -> list[str]:
     return sorted(f.stem for f in BUILT_IN.glob("*.yaml"))
 
 
+@cache
 def named(name: str) -> MarkerSet:
     """A built-in set.  Raises PlumblineError with the nearest name where there is none."""
     if name not in built_in():
@@ -245,3 +248,26 @@ def _reason(error: Any) -> str:
         near = get_close_matches(unknown[0], known, n=1, cutoff=0.5)
         return f"unknown key '{unknown[0]}'; " + (f"did you mean '{near[0]}'?" if near else f"known: {', '.join(known)}")
     return str(error.message)
+
+
+def choose(wanted: str, labels: Iterable[str]) -> MarkerSet | None:
+    """The marker set for one file: a markerset.yaml (its path), a built-in set by name, or the one that fits ("auto").
+
+    None where "auto" finds none.  Raises PlumblineError for an unknown name or a malformed file.
+    """
+    if wanted.endswith((".yaml", ".yml")):
+        return load(Path(wanted))
+    name = match(labels) if wanted == "auto" else wanted
+    return named(name) if name else None
+
+
+def describe(labels: set[str], own: Path | None, wanted: str) -> str:
+    """In words: which set a file's labels fit and what share of the body that gives."""
+    seen = {label for label in labels if not label.startswith("@")}
+    if not seen:
+        return "no markers"
+    chosen = choose(str(own) if own and wanted == "auto" else wanted, seen)
+    if chosen is None:
+        return f"no marker set fits its labels ({', '.join(sorted(seen)[:6])}, ...): write a markerset.yaml; no CoM from segments"
+    share = chosen.share(seen)
+    return f"marker set {chosen.name}: {100 * share:.0f} % of body mass" + ("" if share >= 0.9 else ", under 90 %: no CoM from it")

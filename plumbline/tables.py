@@ -136,6 +136,7 @@ TABLES: dict[str, list[Column]] = {
         _c("cutoff", "float", "Hz", "corner of the low-pass after the double pass"),
         _c("filtered_before", "bool", "", "the file was low-passed before it came to us: its noise cannot be told"),
         _c("limitation", "str", "", "what cannot be judged with this trial and why; empty where all can"),
+        _c("notes", "str", "", "what was assumed or found odd, JSON list"),
     ],
     # -- loci: one row per locus
     "loci": [

@@ -19,6 +19,8 @@ from scipy.signal import oaconvolve
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+NORMAL = 0.6744897501960817  # median absolute value of a standard normal variable
+
 
 @dataclass(frozen=True)
 class Bump:
@@ -110,10 +112,10 @@ def white_noise_sd(signal: Array) -> Array:
     signal: (n,) or (n, d), NaN allowed.  Returns () or (d,).  The sum of squared binomials (1, 4, 6, 4, 1) is 70. The median
     keeps single contacts and pushes out.
     """
-    d = np.diff(np.asarray(signal, dtype=float), n=4, axis=0)
-    with np.errstate(all="ignore"):
-        return (
-            np.asarray(np.nanmedian(np.abs(d), axis=0) / 0.6744897501960817 / np.sqrt(70.0))
-            if len(d)
-            else np.full(np.shape(signal)[1:], np.nan)
-        )
+    d = np.diff(np.asarray(signal, dtype=float).reshape(len(signal), -1), n=4, axis=0)
+    out = np.full(d.shape[1], np.nan)
+    for k in range(d.shape[1]):
+        known = d[np.isfinite(d[:, k]), k]
+        if len(known):
+            out[k] = np.median(np.abs(known)) / NORMAL / np.sqrt(70.0)
+    return out.reshape(np.shape(signal)[1:])

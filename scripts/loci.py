@@ -1,12 +1,12 @@
 """Find pushes and loci of a part."""
 
-from plumbline.loci import loci
+from plumbline.loci import of_part
 from snakemake.iocontainers import Snakemake
 
 from plumbline import job, tables
 
 snakemake: Snakemake
 stamp = job.start(snakemake)
-found, pushes = loci(*(tables.read(n, snakemake.input[n]) for n in ("signals", "coverage", "trials")))
+found, pushes = of_part(*(tables.read(n, snakemake.input[n]) for n in ("signals", "coverage", "trials")))
 tables.write("loci", found, snakemake.output.loci, stamp)
 tables.write("pushes", pushes, snakemake.output.pushes, stamp)

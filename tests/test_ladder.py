@@ -36,9 +36,7 @@ def test_ladder_has_the_fixed_columns() -> None:
     """The table other programs read: pooled, per task, subject and condition; weak and free-run."""
     table = ladder(heldout())
     assert list(table.columns) == [c.name for c in tables.TABLES["ladder"]]
-    top = table[
-        (table["task"] == "all") & (table["subject"] == "all") & (table["condition"] == "all") & (table["axis"] == "lateral")
-    ]
+    top = table[(table["task"] == "all") & (table["subject"] == "all") & (table["condition"] == "all") & (table["axis"] == "lateral")]
     assert set(top["kind"]) == {"weak", "free_run"}
     weak = top[top["kind"] == "weak"].iloc[0]
     assert weak["error_mm"] == pytest.approx(2.0, rel=0.1)

@@ -22,7 +22,7 @@ def one(**spec: Any) -> MarkerSet:
 @pytest.mark.parametrize(
     ("raw", "says"),
     [
-        ({"segments": {"thigh_right": {**THIGH, "tabel": 1}}}, r"mine.yaml, segment 'thigh_right': unknown key 'tabel'; did you mean 'table'"),
+        ({"segments": {"thigh_right": {**THIGH, "tabel": 1}}}, r"'thigh_right': unknown key 'tabel'; did you mean 'table'"),
         ({"segmets": {}}, r"mine.yaml.*"),
         ({"segments": {"thigh_right": {"distal": ["B"], "table": "x"}}}, r"segment 'thigh_right': 'proximal' is a required"),
         ({"segments": {"arm": {**OWN, "mass": 1.4}}}, r"segment 'arm', key 'mass': 1.4"),

@@ -30,9 +30,7 @@ def test_bids_names_and_companions(tmp_path: Path) -> None:
     assert Trial.of(trial.plain()) == trial
 
 
-@pytest.mark.parametrize(
-    "stem", ["walk01", "sub-01", "sub-01_run-1_task-a", "sub-01_task-a_foo-1", "sub-_task-a", "task-a_sub-01"]
-)
+@pytest.mark.parametrize("stem", ["walk01", "sub-01", "sub-01_run-1_task-a", "sub-01_task-a_foo-1", "sub-_task-a", "task-a_sub-01"])
 def test_names_that_are_not_bids(stem: str) -> None:
     """Free names, unknown or misplaced entities are not guessed at."""
     assert entities(stem) is None
@@ -79,9 +77,7 @@ def test_a_broken_participants_table_stops(tmp_path: Path, text: str, said: str)
 def test_ids_with_and_without_sub_are_the_same_person(tmp_path: Path) -> None:
     """`1` and `sub-1` meet; n/a is no number."""
     touch(tmp_path / "raw" / "sub-1_task-a.c3d")
-    (tmp_path / "raw" / "participants.tsv").write_text(
-        "participant_id\tmass_kg\theight_m\tsex\textra\n1\tn/a\t1.8\tfemale\thello\n"
-    )
+    (tmp_path / "raw" / "participants.tsv").write_text("participant_id\tmass_kg\theight_m\tsex\textra\n1\tn/a\t1.8\tfemale\thello\n")
     person = find(tmp_path).participants["sub-1"]
     assert (person.mass, person.height, person.sex) == (None, 1.8, "F")
 

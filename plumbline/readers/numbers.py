@@ -79,7 +79,7 @@ def fields(line: str, sep: str | None) -> list[str]:
 def frame(lines: list[str], sep: str | None, ended: bool, name: str, stated: int | None = None) -> pd.DataFrame:
     """Rows of numbers as a table with columns 0, 1, ...; columns that are not numbers stay text.
 
-    lines: the data lines.  sep: as from `separator`.  ended: the file's last line has its line end.  stated: rows the header states.
+    lines: the data lines.  sep: as from `separator`.  ended: the last line has its line end.  stated: rows the header states.
     Raises Refused(empty_file) without rows and Refused(truncated) where the last line is cut.
     """
     if not lines:
@@ -87,17 +87,18 @@ def frame(lines: list[str], sep: str | None, ended: bool, name: str, stated: int
     counts = [line.count(sep) + 1 if sep else len(line.split()) for line in lines]
     width = max(counts)
     _check_last_line(counts, ended, name, stated)
+    # Excel in half of Europe writes 1,5 for 1.5 and separates by semicolons or tabs
     comma = sep != "," and re.search(r"\d,\d", lines[0]) is not None and "." not in lines[0]
     return pd.read_csv(
         io.StringIO("\n".join(lines)), sep=sep or r"\s+", header=None, names=list(range(width)), skipinitialspace=True,
-        na_values=MISSING, decimal="," if comma else ".", skip_blank_lines=True, low_memory=False, float_precision="high",
+        na_values=MISSING, decimal="," if comma else ".", skip_blank_lines=True, low_memory=False,
     )  # fmt: skip
 
 
 def _check_last_line(counts: list[int], ended: bool, name: str, stated: int | None) -> None:
     """A file that was cut shows in its last line: without a line end, or with a part of a row.
 
-    Writers may drop the blanks of missing markers at the end of a row, always three at a time (TRC), so a shorter row alone is no cut.
+    Writers may drop the blanks of missing markers at the end of a row, three at a time (TRC): a shorter row alone is no cut.
     """
     usual = counts[-2] if len(counts) > 1 else counts[-1]
     short = counts[-1] < usual

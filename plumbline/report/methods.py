@@ -1,0 +1,141 @@
+"""A methods paragraph to paste into a paper: what was done with these recordings, in numbers, with versions and sources."""
+
+import platform
+from collections.abc import Mapping
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+import pandas as pd
+
+from plumbline import __version__
+from plumbline.report.words import number, plural, pooled
+
+PACKAGES = ("numpy", "scipy", "pandas", "pyarrow", "ezc3d", "matplotlib", "bokeh", "snakemake")
+
+MURAI = (
+    "Murai N, Kaneta D, Sugihara T (2013) Identification of a piecewise controller of lateral human standing based on returning "
+    "recursive-least-square method. IEEE/RSJ International Conference on Intelligent Robots and Systems."
+)
+LEVA = "de Leva P (1996) Adjustments to Zatsiorsky-Seluyanov's segment inertia parameters. Journal of Biomechanics 29:1223-1230."
+LIANG = "Liang KY, Zeger SL (1986) Longitudinal data analysis using generalized linear models. Biometrika 73:13-22."
+KING = "King DL, Zatsiorsky VM (1997) Extracting gravity line displacement from stabilographic recordings. Gait & Posture 6:27-38."
+MOELDER = "M\u00f6lder F et al. (2021) Sustainable data analysis with Snakemake. F1000Research 10:33."
+
+
+def versions() -> str:
+    """Versions of what made the results."""
+    return f"plumbline {__version__}, Python {platform.python_version()}, " + ", ".join(f"{p} {_version(p)}" for p in PACKAGES)
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "(not installed)"
+
+
+def references(tables: Mapping[str, pd.DataFrame]) -> list[str]:
+    """Sources of the methods that were used."""
+    used = set(tables["coverage"]["com_method"])
+    return [MURAI, *([LEVA] if "table" in used else []), *([KING] if "force" in used else []), LIANG, MOELDER]
+
+
+def paragraphs(tables: Mapping[str, pd.DataFrame], verdict: Mapping[str, Any], config: Mapping[str, Any]) -> list[str]:
+    """The paragraphs."""
+    return [
+        " ".join([_recordings(tables, config), _com(tables["coverage"]), _filter(config)]),
+        " ".join([_model(config["evaluation"]), _judging(config["evaluation"]), _loci(tables)]),
+        " ".join([*(_result(a, verdict, tables["ladder"]) for a in ("lateral", "forward")), f"Software: {versions()}."]),
+    ]
+
+
+def _recordings(tables: Mapping[str, pd.DataFrame], config: Mapping[str, Any]) -> str:
+    trials = tables["trials"]
+    used = trials[trials["reason"] == ""]
+    tasks = ", ".join(f"{task} ({n})" for task, n in sorted(used["task"].value_counts().items()))
+    rates = " and ".join(f"{r:.0f}" for r in sorted(used["rate"].round().dropna().unique())[:6])
+    said = f"Recordings were processed with plumbline {__version__}. Of {plural(len(used), 'trial')} of "
+    said += f"{plural(used['subject'].nunique(), 'subject')} ({tasks or 'none'}; {rates or 'no'} Hz), "
+    said += f"{plural(int((tables['coverage']['com_method'] != 'none').sum()), 'trial')} had a centre of mass (CoM); "
+    said += f"{plural(len(tables['exclusions']), 'file')} could not be used."
+    samples = (used["markers"] * used["frames"]).sum()
+    if samples:
+        said += f" Marker gaps of up to {config['recording']['max_gap']:g} s were interpolated ("
+        said += f"{100 * used['filled'].sum() / samples:.2f} % of the samples)."
+    return said
+
+
+def _com(coverage: pd.DataFrame) -> str:
+    said = []
+    for method, rows in coverage.groupby("com_method", sort=True):
+        if method == "table":
+            sets = ", ".join(sorted(set(rows["marker_set"]) - {""}))
+            least = rows["mass_share"].min()
+            share = "the whole body has segments" if least > 0.995 else f"segments cover at least {100 * least:.0f} % of body mass"
+            said.append(f"from segment tables (de Leva 1996; marker set {sets}; {share})")
+        elif method == "lab":
+            said.append("as the files hold it")
+        elif method == "force":
+            said.append("by band-limited double integration of the ground reaction, held in place by the centre of pressure")
+    text = "The CoM was taken " + "; ".join(said) + "." if said else "No CoM could be computed."
+    lab = coverage["lab_distance"].dropna()
+    if len(lab):
+        text += f" It lay {1e3 * lab.median():.0f} mm (median over {plural(len(lab), 'trial')}) from the CoM that the files hold."
+    return text + " The zero-moment point (ZMP) is the net centre of pressure in the ground plane."
+
+
+def _filter(config: Mapping[str, Any]) -> str:
+    corner = config["signals"]["cutoff"]
+    return (
+        "For figures, signals were low-passed over the continuous recording by a second-order Butterworth filter run forwards and "
+        f"backwards (zero phase; -3 dB at {corner:g} Hz after both passes). The model was fitted and judged on unfiltered signals."
+    )
+
+
+def _model(evaluation: Mapping[str, Any]) -> str:
+    width, k = evaluation["half_width"], evaluation["exponent"]
+    said = (
+        "The CoM-ZMP model x'' = \u03c9\u00b2 (x - xZ) (Murai et al. 2013) was identified in weak form: both sides were integrated with "
+        f"test functions (1 - s\u00b2)^{k} of half width {width:g} s that touch no push, no gap and no end, the derivative being moved to "
+        "the test function, so that noise is not amplified. \u03c9\u00b2 was estimated per axis and subject by least squares with a free "
+        "constant beside it; its 95 % interval is clustered by the stretches between pushes (Liang and Zeger 1986)."
+    )
+    if evaluation["w2"] == "height":
+        said += " For judging, \u03c9\u00b2 was not the fitted one but g/z at the mean height of the CoM."
+    return said
+
+
+def _judging(evaluation: Mapping[str, Any]) -> str:
+    if evaluation["train"] or evaluation["test"]:
+        train = ", ".join(evaluation["train"]) or "all others"
+        split = f"trained on {train}, judged on {', '.join(evaluation['test'])}"
+    else:
+        split = "whole trials of a subject left out in eight folds, one by one where there are fewer"
+    said = f"The error is the rms of (x - xZ) - x''/\u03c9\u00b2 on trials the model had not seen ({split}), as a distance of the ZMP"
+    said += ", after taking off a constant fitted on the training trials" if evaluation["offset"] == "train" else ", without the constant"
+    return (
+        said + "; its 95 % interval comes from resampling whole trials. The noise floor is the white noise of CoM and ZMP, estimated from "
+        "fourth differences, carried through the same test functions."
+    )
+
+
+def _loci(tables: Mapping[str, pd.DataFrame]) -> str:
+    pushes, loci = tables["pushes"], tables["loci"]
+    if pushes.empty and loci.empty:
+        return "No push and no locus was marked or found."
+    marked = int((pushes["source"] == "event").sum())
+    return (
+        f"{plural(len(pushes), 'push')} ({marked} marked, {len(pushes) - marked} found in the data) were masked; "
+        f"{plural(len(loci), 'locus')} followed."
+    )
+
+
+def _result(axis: str, verdict: Mapping[str, Any], ladder: pd.DataFrame) -> str:
+    plant, rung = verdict["by_axis"][axis]["plant"], pooled(ladder, axis, "weak")
+    if plant["base_error_mm"] is None:
+        return f"The {axis} error could not be stated ({plant['reason']})."
+    said = f"The {axis} held-out error was {number(plant['base_error_mm'])} mm"
+    if rung and rung["ci_low_mm"] == rung["ci_low_mm"]:
+        said += f" (95 % interval {number(rung['ci_low_mm'])} to {number(rung['ci_high_mm'])} mm)"
+    floor = plant["noise_floor_mm"]
+    return said + (f", the noise floor {number(floor)} mm." if floor else "; the noise floor is not known.")

@@ -1,0 +1,77 @@
+"""Borders of the support: from the feet's markers, else from the plates, else unknown."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plumbline.body import points
+from plumbline.forces import EMPTY, MIN_LOAD, Forces, Plate, stays
+from plumbline.markerset import MarkerSet
+
+Array = NDArray[np.float64]
+
+FOOT_HALF_WIDTH = 0.05  # [m] a foot's outline beside markers on its middle line; foot breadth is 0.055 of body height (Winter 2009)
+
+
+@dataclass
+class Support:
+    """left, right (x) and back, front (y) borders [m], (n, 4), NaN where unknown.  source: markers, plates or none."""
+
+    limits: Array
+    source: str
+    note: str
+
+
+def foot_markers(markerset: MarkerSet) -> tuple[dict[str, tuple[str, ...]], float]:
+    """Markers of each foot's outline and the width [m] to add: the set's `support`, else the ends of its foot segments."""
+    if markerset.support:
+        return dict(markerset.support), markerset.half_width if markerset.half_width is not None else 0.0
+    ends = {s.name.removeprefix("foot_"): s.markers for s in markerset.segments if s.name in ("foot_left", "foot_right")}
+    return ends, FOOT_HALF_WIDTH
+
+
+def feet(markers: Mapping[str, Array], markerset: MarkerSet) -> dict[str, Array]:
+    """Outline markers of each foot [m], "left"/"right" -> (n, k, 3); a foot without a seen marker is left out."""
+    have = points(markers, markerset)
+    out = {}
+    for side, names in foot_markers(markerset)[0].items():
+        seen = [have[m] for m in names if m in have and np.isfinite(have[m]).any()]
+        if seen:
+            out[side] = np.stack(seen, axis=1)
+    return out
+
+
+def limits(outline: Mapping[str, Array], markerset: MarkerSet | None, forces: Forces, plates: Sequence[Plate], time: Array) -> Support:
+    """Support borders of each frame.
+
+    outline: as :func:`feet` gives it.  A foot whose plate stays light does not count.  time: [s], shape (n,).
+    """
+    if outline and markerset is not None:
+        width = foot_markers(markerset)[1]
+        note = f"support limits from the markers of {' and '.join(sorted(outline))} foot, widened by {width * 1000:.0f} mm"
+        return Support(_from_feet(outline, forces, width, time), "markers", note)
+    corners = [p.corners for p in plates if p.corners is not None and np.isfinite(p.cop).any()]
+    if corners:
+        border = _box(np.concatenate(corners)[None])
+        return Support(np.repeat(border, len(time), axis=0), "plates", "support limits from the loaded plates' corners")
+    return Support(np.full((len(time), 4), np.nan), "none", "no foot markers and no plate corners: support limits unknown")
+
+
+def _from_feet(outline: Mapping[str, Array], forces: Forces, width: float, time: Array) -> Array:
+    standing = []
+    for side, xyz in outline.items():
+        foot = np.array(xyz)
+        if side in forces.feet and len(outline) == 2:
+            foot[stays(forces.feet[side][0][:, 2] < MIN_LOAD, time, EMPTY)] = np.nan
+        standing.append(foot)
+    return _box(np.concatenate(standing, axis=1)) + width * np.array([-1.0, 1.0, -1.0, 1.0])
+
+
+def _box(xyz: Array) -> Array:
+    """Smallest and largest x and y over the points of each frame, (n, 4); NaN where none is seen."""
+    low = np.where(np.isnan(xyz), np.inf, xyz).min(axis=1)
+    high = np.where(np.isnan(xyz), -np.inf, xyz).max(axis=1)
+    box = np.column_stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1]])
+    return np.where(np.isfinite(box), box, np.nan)

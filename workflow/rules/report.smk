@@ -1,0 +1,32 @@
+# One self-contained page: verdict, what was read and what was not, figures, linked views, methods.
+rule report:
+    input:
+        verdict="results/verdict.json",
+        ladder="results/ladder.parquet",
+        exclusions="results/exclusions.parquet",
+        trials=parts("trials"),
+        coverage=parts("coverage"),
+        loci=parts("loci"),
+        pushes=parts("pushes"),
+        fit=parts("fit"),
+        where=parts("where"),
+        residuals=parts("residuals")[:1],
+        figures=expand("results/{stage}/_{part}.svg", stage=["signals", "loci", "fit", "residuals"], part=PARTS),
+        maps=["results/where/_all.svg", "results/ladder.svg"],
+        captions=sorted(str(f) for f in (REPO / "workflow" / "report").glob("*.rst")),
+    output:
+        report(
+            "results/report.html",
+            caption="../report/report.rst",
+            category="Report",
+            labels={"figure": "The report as one page", "part": "all"},
+        ),
+    params:
+        code=code("report.py"),
+        config={k: config[k] for k in ("recording", "signals", "evaluation")},
+        study="demo study" if Path.cwd() == REPO else Path.cwd().name,
+        parts=PARTS,
+    log:
+        "results/logs/report.log",
+    script:
+        "../../scripts/report.py"
