@@ -14,7 +14,8 @@ FIELDS = {"participant": "participant_id", "session": "session", "task": "task",
 def expression(pattern: str) -> re.Pattern[str]:
     """Regular expression of a pattern such as ``{participant}_{task}_{run}.c3d``; ``*`` stands for anything.
 
-    A field takes letters and digits as BIDS asks (and ``-``, dropped later), not ``_``, ``.`` or ``/``; the pattern is held against the end of a path below raw/.
+    A field takes letters and digits as BIDS asks (and ``-``, dropped later), not ``_``, ``.`` or ``/``; the pattern is held against
+    the end of a path below raw/.
     Raises PlumblineError for an unknown or repeated field, or for a pattern without {participant}.
     """
     out, seen = "", set()
@@ -23,9 +24,7 @@ def expression(pattern: str) -> re.Pattern[str]:
             name = piece[1:-1]
             if name not in FIELDS or name in seen:
                 known = ", ".join("{" + k + "}" for k in FIELDS)
-                raise PlumblineError(
-                    f"pattern '{pattern}': {piece} is unknown or stands twice; known: {known}, and * for anything"
-                )
+                raise PlumblineError(f"pattern '{pattern}': {piece} is unknown or stands twice; known: {known}, and * for anything")
             seen.add(name)
             out += f"(?P<{name}>[^_./\\\\]+)"
         else:

@@ -79,9 +79,9 @@ def run(arguments: list[str]) -> int:
     if not study.is_dir():
         print(f"{study}: no such folder; give the study's folder, e.g. make run STUDY=studies/pds", file=sys.stderr)
         return 2
-    if study.resolve() == REPO and not _recordings(REPO / "raw"):
-        if code := _call("plumbline", "demo", str(REPO / "raw")):
-            return code
+    demo = study.resolve() == REPO and not _recordings(REPO / "raw")
+    if demo and (code := _call("plumbline", "demo", str(REPO / "raw"))):
+        return code
     if not any(o.startswith(("-c", "-j", "--cores", "--jobs")) for o in options):
         options = [f"--cores={os.cpu_count() or 1}", *options]
     base = ["-s", str(REPO / "Snakefile"), "-d", str(study)]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from plumbline.models.com_zmp import Noise, PlantFit, fit, free_run, zmp_error
 from plumbline.physics import G
 from plumbline.plant import AXES, Plant, of_trials
+from plumbline.study import names
 
 Array = NDArray[np.float64]
 
@@ -29,6 +30,7 @@ class Windows:
     plant: Plant
     time: Array
     locus: NDArray[np.int64]  # number of the locus at each frame, 0 outside
+    names: frozenset[str] = frozenset()  # what the config may call the trial
 
     @property
     def picked(self) -> NDArray[np.int64]:
@@ -45,7 +47,8 @@ def identify(
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Tables `fit` and `heldout` of a part.
 
-    signals, pushes, loci, coverage: tables of whole subjects.  evaluation: the config section.
+    signals, pushes, loci, coverage: tables of whole subjects (coverage may have the column `files` of `trials`, for names in the
+    config).  evaluation: the config section.
     """
     everything = list(windows(signals, pushes, loci, coverage, evaluation))
     fits: list[dict[str, Any]] = []
@@ -71,7 +74,8 @@ def windows(
         inside = locus_of_frames(frames, loci[loci["trial"] == about["trial"]])
         for axis, plant in plants.items():
             key = (about["trial"], about["subject"], about["task"], about["condition"])
-            yield Windows(*key, axis, plant, frames["time"].to_numpy(), inside)
+            called = names(about["trial"], about["task"], str(about.get("files", "")).split(" + "))
+            yield Windows(*key, axis, plant, frames["time"].to_numpy(), inside, frozenset(called))
 
 
 def locus_of_frames(frames: pd.DataFrame, loci: pd.DataFrame) -> NDArray[np.int64]:
@@ -170,8 +174,8 @@ def judge(mine: Sequence[Windows], evaluation: Mapping[str, Any]) -> Iterator[di
 def folds(mine: Sequence[Windows], evaluation: Mapping[str, Any]) -> Iterator[tuple[int, list[Windows], list[Windows]]]:
     """(number, training trials, test trials): eight folds of whole trials (one by one when fewer), or as the config asks."""
     if evaluation["train"] or evaluation["test"]:
-        train = [w for w in mine if not evaluation["train"] or chosen_by(w, evaluation["train"])]
-        test = [w for w in mine if chosen_by(w, evaluation["test"])] if evaluation["test"] else []
+        train = [w for w in mine if not evaluation["train"] or w.names & set(evaluation["train"])]
+        test = [w for w in mine if w.names & set(evaluation["test"])]
         seen = {w.trial for w in test}
         yield 0, [w for w in train if w.trial not in seen], test
         return
@@ -180,12 +184,6 @@ def folds(mine: Sequence[Windows], evaluation: Mapping[str, Any]) -> Iterator[tu
         return
     for k in range(number):
         yield k + 1, [w for i, w in enumerate(mine) if i % number != k], mine[k::number]
-
-
-def chosen_by(w: Windows, names: Sequence[str]) -> bool:
-    """Whether a trial is meant by a task, a trial id, or the task with its run (`squats_run-01`)."""
-    run = next((e for e in w.trial.split("_") if e.startswith("run-")), "")
-    return bool({w.task, w.trial, f"{w.task}_{run}"} & set(names))
 
 
 def _w2(w: Windows, fitted: float, evaluation: Mapping[str, Any]) -> float:

@@ -32,6 +32,7 @@ from plumbline import landmarks, segments
 from plumbline.errors import PlumblineError
 from plumbline.segments import Numbers
 
+DATA_FILES = ("markersets/*.yaml",)  # part of this module for plumbline/provenance.py
 BUILT_IN = Path(__file__).parent / "markersets"
 MIN_SHARE = 0.3  # [1] of body mass a built-in set must explain to be taken for the file's set: two legs
 

@@ -8,6 +8,7 @@ import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -78,6 +79,26 @@ class Trial:
         """Build from :meth:`plain`."""
         files = tuple(Path(f) for f in plain["files"])
         return cls(**{**plain, "files": files, "events": Path(plain["events"]) if plain["events"] else None})
+
+
+def names(trial: str, task: str, files: Iterable[str | Path]) -> set[str]:
+    """What a config may call a trial: its task, its id, the task with its run (`squats_run-01`), a file name without ending."""
+    run = next((e for e in trial.split("_") if e.startswith("run-")), "")
+    return {task, trial, f"{task}_{run}", *(Path(f).stem for f in files)}
+
+
+def check_names(trials: Iterable[Trial], wanted: Mapping[str, Iterable[str]]) -> None:
+    """Raise PlumblineError for a name in the config that no trial has, with the nearest one.
+
+    wanted: key of the config -> the names given there.
+    """
+    known = sorted({n for t in trials for n in names(t.trial, t.task, t.files)})
+    for key, given in wanted.items():
+        for name in given:
+            if name not in known:
+                near = get_close_matches(name, known, n=1)
+                advice = f"did you mean '{near[0]}'?" if near else f"tasks here: {', '.join(sorted({t.task for t in trials}))}"
+                raise PlumblineError(f"{key}: no trial, task or file is called '{name}'; {advice}")
 
 
 @dataclass(frozen=True)
@@ -278,13 +299,9 @@ def _number(table: Path, line: int, column: str, text: str, low: float, high: fl
     try:
         value = float(text)
     except ValueError:
-        raise PlumblineError(
-            f"{table}: line {line}, column {column}: '{text}' is no number (write n/a where not known)"
-        ) from None
+        raise PlumblineError(f"{table}: line {line}, column {column}: '{text}' is no number (write n/a where not known)") from None
     if not low <= value <= high:
-        raise PlumblineError(
-            f"{table}: line {line}, column {column}: {value:g} is outside {low:g} to {high:g}; is the unit right?"
-        )
+        raise PlumblineError(f"{table}: line {line}, column {column}: {value:g} is outside {low:g} to {high:g}; is the unit right?")
     return value
 
 

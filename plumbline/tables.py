@@ -276,7 +276,10 @@ def empty(name: str) -> pd.DataFrame:
     return schema(name).empty_table().to_pandas()
 
 
-def write(name: str, frame: pd.DataFrame, path: str | Path, stamp: Stamp = Stamp()) -> None:
+NO_STAMP = Stamp()
+
+
+def write(name: str, frame: pd.DataFrame, path: str | Path, stamp: Stamp = NO_STAMP) -> None:
     """Write a table under a temporary name and rename it, so that a killed job leaves no half file.
 
     Raises PlumblineError where the columns are not those of :data:`TABLES`.

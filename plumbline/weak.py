@@ -14,7 +14,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import oaconvolve
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -78,18 +77,16 @@ class Bump:
         x = np.asarray(signal, dtype=float)
         columns = x.reshape(len(x), -1)
         out = np.full(columns.shape, np.nan)
-        if len(x) >= len(weights):
-            bad = ~np.isfinite(columns)
-            centre = np.nanmean(np.where(bad, np.nan, columns), axis=0) if not bad.all() else np.zeros(columns.shape[1])
-            centre = np.nan_to_num(centre)  # far origins cost digits in the FFT; constants are put back exactly
-            filled = np.where(bad, 0.0, columns - centre)
-            body = oaconvolve(filled, weights[::-1, None], mode="valid", axes=0) + centre * weights.sum()
-            hit = self._touches(bad)
-            out[self.reach : len(x) - self.reach] = np.where(hit, np.nan, body)
+        for k in range(columns.shape[1]) if len(x) >= len(weights) else ():
+            bad = ~np.isfinite(columns[:, k])
+            if not bad.all():
+                centre = columns[~bad, k].mean()  # far origins cost digits; a constant is put back exactly
+                body = np.convolve(np.where(bad, 0.0, columns[:, k] - centre), weights[::-1], mode="valid") + centre * weights.sum()
+                out[self.reach : len(x) - self.reach, k] = np.where(self._touches(bad), np.nan, body)
         return out.reshape(x.shape)
 
     def _touches(self, bad: Mask) -> Mask:
-        count = np.concatenate([np.zeros((1, bad.shape[1]), int), np.cumsum(bad, axis=0)])
+        count = np.concatenate([[0], np.cumsum(bad)])
         width = 2 * self.reach + 1
         return np.asarray(count[width:] - count[:-width] > 0)
 

@@ -9,7 +9,8 @@ from plumbline.plant import SIGNALS
 snakemake: Snakemake
 stamp = job.start(snakemake)
 signals = tables.read("signals", snakemake.input.signals, columns=SIGNALS)
-others = [tables.read(n, snakemake.input[n]) for n in ("pushes", "loci", "coverage")]
-fit, heldout = identify(signals, *others, snakemake.params.config)
+pushes, loci, coverage = (tables.read(n, snakemake.input[n]) for n in ("pushes", "loci", "coverage"))
+coverage = coverage.merge(tables.read("trials", snakemake.input.trials, columns=["trial", "files"]), on="trial")
+fit, heldout = identify(signals, pushes, loci, coverage, snakemake.params.config)
 tables.write("fit", fit, snakemake.output.fit, stamp)
 tables.write("heldout", heldout, snakemake.output.heldout, stamp)

@@ -1,9 +1,9 @@
 """Find pushes and loci of a part."""
 
-from plumbline.loci import of_part
 from snakemake.iocontainers import Snakemake
 
 from plumbline import job, tables
+from plumbline.loci import of_part
 
 snakemake: Snakemake
 stamp = job.start(snakemake)

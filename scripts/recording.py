@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from plumbline.recording import tables_of
 from snakemake.iocontainers import Snakemake
 
 from plumbline import job, tables
+from plumbline.recording import tables_of
 from plumbline.study import Trial
 
 snakemake: Snakemake

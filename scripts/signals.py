@@ -1,10 +1,10 @@
 """CoM, ZMP, forces and support of a part, one row per frame."""
 
-from plumbline.recording import recordings
-from plumbline.signals import of_part
 from snakemake.iocontainers import Snakemake
 
 from plumbline import job, tables
+from plumbline.recording import recordings
+from plumbline.signals import of_part
 from plumbline.study import Participant
 
 snakemake: Snakemake

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from plumbline.config import with_defaults
-from plumbline.fit import Windows, chosen_by, folds, identify, solve, windows
+from plumbline.fit import Windows, folds, identify, solve, windows
 from plumbline.ladder import ladder
 from plumbline.plant import Plant, pieces
 from plumbline.simulate.pendulum import loci
@@ -132,9 +132,8 @@ def test_an_explicit_comparison_trains_and_tests_where_it_is_told() -> None:
     """Tasks, trial ids, or a task with its run; a trial named on both sides is tested only."""
     tables = study(loci(4, omega=2.74, k1=4.038, k2=0.875, seed=6))
     mine = [w for w in windows(*tables, EVALUATION) if w.axis == "lateral"]
-    assert chosen_by(mine[0], ["lateral"])
-    assert chosen_by(mine[0], ["lateral_run-0001"])
-    assert not chosen_by(mine[0], ["lateral_run-0002", "quiet"])
+    assert {"lateral", "lateral_run-0001", mine[0].trial} <= mine[0].names
+    assert not mine[0].names & {"lateral_run-0002", "quiet"}
     asked = {**EVALUATION, "train": ["lateral"], "test": [mine[2].trial]}
     ((number, train, test),) = folds(mine, asked)
     assert (number, len(train), [w.trial for w in test]) == (0, 3, [mine[2].trial])

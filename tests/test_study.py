@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from plumbline.errors import PlumblineError
-from plumbline.study import Trial, assign, entities, find
+from plumbline.study import Trial, assign, check_names, entities, find
 
 
 def touch(*files: Path) -> None:
@@ -99,3 +99,13 @@ def test_inserting_a_subject_changes_one_part(numbers: set[int], new: int, size:
 def test_a_cohort_is_hundreds_of_parts() -> None:
     """1,000 subjects at the default of 8 are 125 parts: with five stages and a figure job, 750 jobs."""
     assert len(set(assign([f"sub-{i:04d}" for i in range(1000)], 8).values())) == 125
+
+
+def test_names_in_the_config_are_known(tmp_path: Path) -> None:
+    """A task, a trial id, a task with its run or a file's own name; anything else stops with the nearest one."""
+    touch(tmp_path / "raw" / "STS1.trc")
+    (tmp_path / "recordings.tsv").write_text("file\tparticipant_id\ttask\trun\nSTS1.trc\t4\tsts\t01\n")
+    trials = find(tmp_path).trials
+    check_names(trials, {"evaluation.test": ["sts", "STS1", "sub-4_task-sts_run-01", "sts_run-01"]})
+    with pytest.raises(PlumblineError, match=r"evaluation\.train: .*did you mean 'STS1'"):
+        check_names(trials, {"evaluation.train": ["STS2"]})

@@ -108,7 +108,7 @@ def _phase(axes: Axes, rows: pd.DataFrame, c: str) -> None:
         x = _v(rows, column)
         axes.plot(x, s.difference(x, time), color=colour, lw=width)
     axes.set(xlabel=f"CoM ${c}$ [m]", ylabel=rf"$\dot{{{c}}}$ [m/s]")
-    axes.set_title("phase portrait, free run blue", fontsize=7)
+    axes.set_title("\nphase portrait, free run blue", fontsize=7)  # the empty line is the block's title
 
 
 def _against(axes: Axes, rows: pd.DataFrame, c: str) -> None:

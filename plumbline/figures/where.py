@@ -16,8 +16,8 @@ FEWEST = 10  # frames in a bin that is drawn
 TITLES = (
     "mean error over the phase plane",
     "rms error over the phase plane",
-    "error since the locus began",
-    "error trial by trial",
+    "error since the locus began (mean dashed)",
+    "error by trial (dots rms, bars mean)",
     "spectrum of the error",
 )
 SIGNED = LinearSegmentedColormap.from_list("signed", ["#4b2a7b", "#b9a8d4", "#f7f7f7", "#f6b27a", s.RESIDUAL, "#7f3300"])
@@ -113,10 +113,9 @@ def _time(axes: Axes, where: pd.DataFrame) -> None:
     if bins.empty:
         s.blank(axes, "no loci, so no time since one began")
         return
-    axes.plot(bins["a"], 1e3 * bins["rms"], color=s.RESIDUAL, lw=1.4, label="rms")
-    axes.plot(bins["a"], 1e3 * bins["mean"], color=s.RESIDUAL, lw=0.9, ls="--", label="mean")
+    axes.plot(bins["a"], 1e3 * bins["rms"], color=s.RESIDUAL, lw=1.4)
+    axes.plot(bins["a"], 1e3 * bins["mean"], color=s.RESIDUAL, lw=0.9, ls="--")
     axes.axhline(0, color=s.FAINT, lw=0.6, zorder=0)
-    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=2, borderpad=0)
     axes.set(xlabel="time since the locus began [s]", ylabel="error [mm]")
 
 
@@ -126,9 +125,8 @@ def _trial(axes: Axes, where: pd.DataFrame) -> None:
         s.blank(axes, "nothing was judged along this axis")
         return
     number = np.arange(1, len(bins) + 1)
-    axes.plot(number, 1e3 * bins["rms"], "o", color=s.RESIDUAL, ms=3.5 if len(bins) < 80 else 1.5, label="rms")
-    axes.plot(number, 1e3 * bins["mean"], "_", color=s.RESIDUAL, ms=5 if len(bins) < 80 else 2, label="mean")
-    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=2, borderpad=0)
+    axes.plot(number, 1e3 * bins["rms"], "o", color=s.RESIDUAL, ms=3.5 if len(bins) < 80 else 1.5)
+    axes.plot(number, 1e3 * bins["mean"], "_", color=s.RESIDUAL, ms=5 if len(bins) < 80 else 2)
     axes.axhline(0, color=s.FAINT, lw=0.6, zorder=0)
     for k in np.flatnonzero(bins["subject"].to_numpy()[1:] != bins["subject"].to_numpy()[:-1]) if len(bins) < 300 else []:
         axes.axvline(k + 1.5, color=s.FAINT, lw=0.5, zorder=0)
@@ -139,7 +137,7 @@ def _trial(axes: Axes, where: pd.DataFrame) -> None:
 def _frequency(axes: Axes, where: pd.DataFrame) -> None:
     bins = pooled(where, "frequency", ["a"])
     if bins.empty:
-        s.blank(axes, "no unbroken piece of 4 s, so no spectrum")
+        s.blank(axes, "no unbroken piece of 2 s, so no spectrum")
         return
     axes.loglog(bins["a"], 1e3 * bins["rms"], color=s.RESIDUAL, lw=1.2)
     axes.set(xlabel="frequency $f$ [Hz]", ylabel=r"error [mm/$\sqrt{\mathrm{Hz}}$]")

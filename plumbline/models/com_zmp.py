@@ -7,8 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
-from scipy.signal import lfilter
+from scipy.special import stdtrit
 
 Array = NDArray[np.float64]
 
@@ -52,7 +51,7 @@ class PlantFit(NamedTuple):
 
     def omega_interval(self, level: float = 0.95) -> tuple[float, float]:
         """Interval of omega [rad/s] from the t interval of w2; a bound below w2 = 0 is 0."""
-        reach = stats.t.ppf(0.5 + level / 2, max(self.dof, 1)) * np.sqrt(self.covariance[0, 0])
+        reach = stdtrit(max(self.dof, 1), 0.5 + level / 2) * np.sqrt(self.covariance[0, 0])
         low, high = max(self.w2 - reach, 0.0), max(self.w2 + reach, 0.0)
         return float(np.sqrt(low)), float(np.sqrt(high))
 
@@ -114,16 +113,21 @@ def bounded_response(p: Array, omega: float, rate: float) -> Array:
     """The bounded solution of eq. 1 for a measured ZMP: half the sum of a causal and an anticausal first-order response.
 
     With xi = x + x'/w and eta = x - x'/w, eq. 1 splits into xi' = w (xi - p), run backwards in time, and eta' = -w (eta - p),
-    run forwards; x = (xi + eta)/2.  p: [m], shape (n,), linear between samples.  omega [rad/s].  rate [Hz].  Returns [m], shape (n,).
+    run forwards; x = (xi + eta)/2.  p: [m], shape (n,), linear between samples.  omega [rad/s].  rate [Hz].  Returns [m], (n,).
     """
-    a = np.exp(-omega / rate)
-    r = omega / rate
-    # exact response to a line between samples (first-order hold)
-    b1 = (1 - a) / r - a
-    b0 = 1 - (1 - a) / r
-    forward = lfilter([b0, b1], [1.0, -a], p, zi=[p[0] * (1 - b0)])[0]
-    backward = lfilter([b0, b1], [1.0, -a], p[::-1], zi=[p[-1] * (1 - b0)])[0][::-1]
-    return np.asarray((forward + backward) / 2)
+    return (_lagging(p, omega / rate) + _lagging(p[::-1], omega / rate)[::-1]) / 2
+
+
+def _lagging(p: Array, r: float) -> Array:
+    """First-order response to p, exact for lines between samples, at rest at the start.  r: omega times the sample time [1]."""
+    a = np.exp(-r)
+    share = (1 - a) / r
+    y = np.concatenate([p[:1], (1 - share) * p[1:] + (share - a) * p[:-1]])
+    step = 1
+    while step < len(y):  # y_k = a y_(k-1) + u_k for all k at once: reach doubles with each pass
+        y[step:] = y[step:] + a**step * y[:-step]
+        step *= 2
+    return np.asarray(y)
 
 
 def free_run(x: Array, p: Array, omega: float, rate: float) -> Array:

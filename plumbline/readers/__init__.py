@@ -1,12 +1,14 @@
 """Readers of recordings: one file in, one :class:`plumbline.readers.raw.Raw` out, in SI and the lab's own axes."""
 
 from collections.abc import Mapping, Sequence
+from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any, cast
 
 from plumbline.errors import Refused
 from plumbline.readers.raw import Raw
 
+DATA_FILES = ("c3d.py",)  # named as text below, so that only the child imports it; see plumbline/provenance.py
 OPENSIM = (".trc", ".mot", ".sto")
 TEXT = (".csv", ".txt", ".tsv", ".dat")
 KISTLER = b"CPlateEight"  # BioWare writes its classes by name near the top
@@ -31,7 +33,7 @@ def read_file(path: Path, columns: Sequence[Mapping[str, Any]] = ()) -> Raw:
         from plumbline.readers import opensim
 
         return opensim.read(path)
-    if ending in TEXT and not _kistler(path):
+    if ending != ".parquet" and (_described(path, columns) or (ending in TEXT and not _kistler(path))):
         from plumbline.readers import text
 
         return text.read(path, columns)
@@ -40,6 +42,11 @@ def read_file(path: Path, columns: Sequence[Mapping[str, Any]] = ()) -> Raw:
 
         return parquet.read(path, columns)
     raise Refused("unsupported", f"{path.name}: {_what(ending)}", EXPORT)
+
+
+def _described(path: Path, columns: Sequence[Mapping[str, Any]]) -> bool:
+    """Whether the config says what the columns of this file are: then it is text, whatever its ending."""
+    return any(fnmatch(path.name, entry["files"]) for entry in columns)
 
 
 def _kistler(path: Path) -> bool:

@@ -31,6 +31,8 @@ try:
             f"{STUDY.raw}/ of {Path.cwd()} holds no recording: put files there as the README shows, "
             "or type `make run` in the repository, which makes the demo's"
         )
+    asked = {f"evaluation.{key}": config["evaluation"][key] for key in ("train", "test")}
+    studies.check_names(STUDY.trials, asked)
 except PlumblineError as error:
     raise WorkflowError(str(error)) from None
 

@@ -5,6 +5,7 @@ rule fit:
         coverage="results/coverage/{part}.parquet",
         pushes="results/pushes/{part}.parquet",
         loci="results/loci/{part}.parquet",
+        trials="results/trials/{part}.parquet",
     output:
         fit="results/fit/{part}.parquet",
         heldout="results/heldout/{part}.parquet",
