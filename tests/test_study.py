@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from plumbline.errors import PlumblineError
+from plumbline.errors import REASONS, PlumblineError
 from plumbline.study import Trial, assign, check_names, entities, find
 
 
@@ -109,3 +109,9 @@ def test_names_in_the_config_are_known(tmp_path: Path) -> None:
     check_names(trials, {"evaluation.test": ["sts", "STS1", "sub-4_task-sts_run-01", "sts_run-01"]})
     with pytest.raises(PlumblineError, match=r"evaluation\.train: .*did you mean 'STS1'"):
         check_names(trials, {"evaluation.train": ["STS2"]})
+
+
+def test_every_reason_code_is_in_the_docs() -> None:
+    """The table of reasons in docs/own-data.md is the closed list."""
+    text = (Path(__file__).resolve().parents[1] / "docs" / "own-data.md").read_text()
+    assert [line.split("`")[1] for line in text.splitlines() if line.startswith("| `") and line.split("`")[1] in REASONS] == list(REASONS)

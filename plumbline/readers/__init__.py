@@ -46,7 +46,7 @@ def read_file(path: Path, columns: Sequence[Mapping[str, Any]] = ()) -> Raw:
 
 def _described(path: Path, columns: Sequence[Mapping[str, Any]]) -> bool:
     """Whether the config says what the columns of this file are: then it is text, whatever its ending."""
-    return any(fnmatch(path.name, entry["files"]) for entry in columns)
+    return any(fnmatch(path.name.lower(), str(entry["files"]).lower()) for entry in columns)
 
 
 def _kistler(path: Path) -> bool:
