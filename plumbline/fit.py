@@ -146,7 +146,7 @@ def _warning(got: PlantFit, at_height: float) -> str:
     if got.w2 <= 0:
         return "w2 is not positive: the CoM does not fall away from the ZMP here"
     if got.clusters < 3:
-        return f"the interval rests on {got.clusters} independent pieces"
+        return f"the interval rests on {got.clusters} independent piece{'s' * (got.clusters > 1)}"
     ratio = got.w2 / at_height**2
     if not 0.5 < ratio < 1.5:
         return f"w2 is {ratio:.2f} of g/z: some effect is missing, this is no natural frequency"

@@ -21,7 +21,7 @@ AXES = {"lateral": "x", "forward": "y"}
 
 PUSH_MARGIN = 0.08  # [s] hands touch before and leave after the marks
 STRIDE = 0.05  # [s] between the centres of two test functions; they overlap, so clusters, not windows, carry the intervals
-BLOCK = 10.0  # [s] longest stretch that counts as one independent piece
+BLOCK = 5.0  # [s] longest stretch that counts as one independent piece: about a locus
 
 SIGNALS = [
     "trial",
