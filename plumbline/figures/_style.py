@@ -77,8 +77,7 @@ def save(figure: Figure, path: str | Path) -> None:
 def _settle(figure: Figure) -> None:
     """Space the panels once and round where they stand: the solver's last digits differ from run to run."""
     with rc_context(_RC):
-        for _ in range(2):  # ticks change with the room they get
-            figure.draw_without_rendering()
+        figure.draw_without_rendering()
     figure.set_layout_engine("none")
     for axes in figure.findobj(Axes):
         left, bottom, width, height = (round(v, 4) for v in axes.get_position(original=True).bounds)

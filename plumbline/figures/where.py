@@ -72,7 +72,7 @@ def _phase(axes: Axes, where: pd.DataFrame, c: str, which: str) -> None:
     limits: dict[str, Any] = (
         {"vmin": -reach, "vmax": reach, "cmap": SIGNED} if which == "mean" else {"vmin": 0.0, "vmax": reach, "cmap": LEVEL}
     )
-    mesh = axes.pcolormesh(a, b, z, rasterized=z.size > 4000, **limits)
+    mesh = axes.pcolormesh(a, b, z, rasterized=z.size > 4000, edgecolors="face", linewidth=0.3, **limits)  # no seams
     bar = axes.figure.colorbar(mesh, ax=axes, pad=0.02, aspect=14, extend="both" if which == "mean" else "max")
     bar.set_label(f"{which} error [mm]")
     bar.outline.set_visible(False)
@@ -137,7 +137,7 @@ def _trial(axes: Axes, where: pd.DataFrame) -> None:
 def _frequency(axes: Axes, where: pd.DataFrame) -> None:
     bins = pooled(where, "frequency", ["a"])
     if bins.empty:
-        s.blank(axes, "no unbroken piece of 2 s, so no spectrum")
+        s.blank(axes, "no unbroken piece is long enough for a spectrum")
         return
     axes.loglog(bins["a"], 1e3 * bins["rms"], color=s.RESIDUAL, lw=1.2)
     axes.set(xlabel="frequency $f$ [Hz]", ylabel=r"error [mm/$\sqrt{\mathrm{Hz}}$]")

@@ -84,15 +84,16 @@ def page(
 
 
 def pictures(results: Path, parts: Sequence[str], captions: Mapping[str, str], config: Mapping[str, Any]) -> list[Picture]:
-    """The figures of a study, those of the cohort first.
+    """The figures of a study; those of the cohort come first where there are several parts, else last, as data flow.
 
     results: folder.  parts: their names.  captions: stage -> text of workflow/report/<stage>.rst, a Jinja template that may name
     `snakemake.config` like a caption of Snakemake's own report.
     """
     said = {k: jinja2.Template(v).render(snakemake={"config": config}).strip() for k, v in captions.items()}
-    out = [Picture(stage, "", said[stage], path, (results / path).read_bytes()) for stage, path in COHORT.items()]
+    cohort = [Picture(stage, "", said[stage], path, (results / path).read_bytes()) for stage, path in COHORT.items()]
+    out: list[Picture] = []
     for number, part in enumerate(parts):
         for stage in STAGES:
             path = f"{stage}/_{part}.svg"
             out.append(Picture(stage, part, said[stage], path, (results / path).read_bytes() if number < INLINE_PARTS else None))
-    return out
+    return cohort + out if len(parts) > 1 else out + cohort

@@ -10,6 +10,7 @@ import pandas as pd
 from plumbline import __version__
 from plumbline.report.words import number, plural, pooled
 
+OWN = "markerset"  # name of a marker set that came with the study
 PACKAGES = ("numpy", "scipy", "pandas", "pyarrow", "ezc3d", "matplotlib", "bokeh", "snakemake")
 
 MURAI = (
@@ -37,7 +38,8 @@ def _version(package: str) -> str:
 def references(tables: Mapping[str, pd.DataFrame]) -> list[str]:
     """Sources of the methods that were used."""
     used = set(tables["coverage"]["com_method"])
-    return [MURAI, *([LEVA] if "table" in used else []), *([KING] if "force" in used else []), LIANG, MOELDER]
+    built_in = set(tables["coverage"].loc[tables["coverage"]["com_method"] == "table", "marker_set"]) - {OWN}
+    return [MURAI, *([LEVA] if built_in else []), *([KING] if "force" in used else []), LIANG, MOELDER]
 
 
 def paragraphs(tables: Mapping[str, pd.DataFrame], verdict: Mapping[str, Any], config: Mapping[str, Any]) -> list[str]:
@@ -69,10 +71,9 @@ def _com(coverage: pd.DataFrame) -> str:
     said = []
     for method, rows in coverage.groupby("com_method", sort=True):
         if method == "table":
-            sets = ", ".join(sorted(set(rows["marker_set"]) - {""}))
             least = rows["mass_share"].min()
             share = "the whole body has segments" if least > 0.995 else f"segments cover at least {100 * least:.0f} % of body mass"
-            said.append(f"from segment tables (de Leva 1996; marker set {sets}; {share})")
+            said.append(f"from segments ({_sets(rows)}; {share})")
         elif method == "lab":
             said.append("as the files hold it")
         elif method == "force":
@@ -82,6 +83,13 @@ def _com(coverage: pd.DataFrame) -> str:
     if len(lab):
         text += f" It lay {1e3 * lab.median():.0f} mm (median over {plural(len(lab), 'trial')}) from the CoM that the files hold."
     return text + " The zero-moment point (ZMP) is the net centre of pressure in the ground plane."
+
+
+def _sets(coverage: pd.DataFrame) -> str:
+    """Which segments: those of a built-in marker set are de Leva's, those of markerset.yaml may be anybody's."""
+    names = sorted(set(coverage["marker_set"]) - {"", OWN})
+    built_in = [f"tables of de Leva 1996, marker set {', '.join(names)}"] if names else []
+    return "; ".join(built_in + (["numbers of the study's own markerset.yaml"] if OWN in set(coverage["marker_set"]) else []))
 
 
 def _filter(config: Mapping[str, Any]) -> str:

@@ -32,11 +32,11 @@ rule figures:
             category="Model",
             labels={"figure": "Measured and modelled", "part": "{part}"},
         ),
+    log:
+        "results/logs/figures/{part}.log",
     params:
         code=code("figures.py"),
         config={},
-    log:
-        "results/logs/figures/{part}.log",
     script:
         "../../scripts/figures.py"
 
@@ -58,10 +58,10 @@ rule maps:
             category="Criticism",
             labels={"figure": "The ladder", "part": "all"},
         ),
+    log:
+        "results/logs/maps.log",
     params:
         code=code("maps.py"),
         config={},
-    log:
-        "results/logs/maps.log",
     script:
         "../../scripts/maps.py"

@@ -11,7 +11,11 @@ rule report:
         fit=parts("fit"),
         where=parts("where"),
         residuals=parts("residuals")[:1],
-        figures=expand("results/{stage}/_{part}.svg", stage=["signals", "loci", "fit", "residuals"], part=PARTS),
+        figures=expand(
+            "results/{stage}/_{part}.svg",
+            stage=["signals", "loci", "fit", "residuals"],
+            part=PARTS,
+        ),
         maps=["results/where/_all.svg", "results/ladder.svg"],
         captions=sorted(str(f) for f in (REPO / "workflow" / "report").glob("*.rst")),
     output:
@@ -21,12 +25,12 @@ rule report:
             category="Report",
             labels={"figure": "The report as one page", "part": "all"},
         ),
+    log:
+        "results/logs/report.log",
     params:
         code=code("report.py"),
         config={k: config[k] for k in ("recording", "signals", "evaluation")},
         study="demo study" if Path.cwd() == REPO else Path.cwd().name,
         parts=PARTS,
-    log:
-        "results/logs/report.log",
     script:
         "../../scripts/report.py"
