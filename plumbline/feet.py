@@ -1,5 +1,7 @@
 """Whose foot a plate carries: by the markers nearest to its CoP. Pipeline axes, SI."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from plumbline.axes import side_of
@@ -10,23 +12,24 @@ BAND = 0.12  # [m] markers with a side within this height of the lowest one belo
 FAR = 0.4  # [m] a CoP further than this from the foot on its plate is no CoP of that foot
 
 
-def places(markers: dict[str, Array]) -> dict[str, Array]:
-    """Mean horizontal place of each foot's markers, side -> (n, 2) [m]; empty where a side has none.
+def groups(markers: Mapping[str, Array]) -> dict[str, Array]:
+    """Markers of each foot, side -> (n, k, 3) [m]; a side without any is left out.
 
-    A foot's markers are those with a side in their name whose median height lies within 12 cm of the lowest of them.
+    A foot's markers are those with a side in their name whose lowest height (5th percentile) lies within 12 cm of the lowest.
     """
-    sided = {label: side_of(label)[0] for label in markers}
-    height = {label: float(np.nanmedian(markers[label][:, 2])) for label, side in sided.items() if side}
-    if not height:
-        return {}
-    low = min(height.values()) + BAND
+    sided = {label: side_of(label)[0] for label, values in markers.items() if np.isfinite(values[:, 2]).any()}
+    height = {label: float(np.nanpercentile(markers[label][:, 2], 5)) for label, side in sided.items() if side}
+    low = min(height.values(), default=0.0) + BAND
+    found = {side: [markers[x] for x, h in height.items() if h <= low and sided[x] == side] for side in ("left", "right")}
+    return {side: np.stack(group, axis=1) for side, group in found.items() if group}
+
+
+def places(markers: Mapping[str, Array]) -> dict[str, Array]:
+    """Mean horizontal place of each foot's markers, side -> (n, 2) [m]; empty where a side has none."""
     out: dict[str, Array] = {}
-    for side in ("left", "right"):
-        group = [markers[label][:, :2] for label, h in height.items() if h <= low and sided[label] == side]
-        if group:
-            stack = np.stack(group)
-            count = np.isfinite(stack).sum(axis=0)
-            out[side] = np.where(count > 0, np.nansum(stack, axis=0) / np.maximum(count, 1), np.nan)
+    for side, group in groups(markers).items():
+        count = np.isfinite(group[..., :2]).sum(axis=1)
+        out[side] = np.where(count > 0, np.nansum(group[..., :2], axis=1) / np.maximum(count, 1), np.nan)
     return out if len(out) == 2 else {}
 
 
@@ -67,7 +70,10 @@ def _nearest(plate: Plate, time: Array, feet: dict[str, Array]) -> str:
 
 
 def _check_distance(plate: Plate, time: Array, feet: dict[str, Array], notes: list[str]) -> None:
-    """A CoP that no foot can reach is set missing, with a note."""
+    """A CoP that no foot can reach is set missing, and with it the moment, with a note.
+
+    Where this befalls most of the load, the moments of light samples are not to be trusted either.
+    """
     if plate.foot not in feet:
         return
     distance = _distances(plate, time, feet[plate.foot])
@@ -76,6 +82,7 @@ def _check_distance(plate: Plate, time: Array, feet: dict[str, Array], notes: li
     if far.any():
         plate.cop[far] = np.nan
         plate.free_moment[far] = np.nan
+        plate.moment[far | ~loaded if far.sum() > 0.5 * loaded.sum() else far] = np.nan
         notes.append(
             f"plate {plate.number}: CoP more than {FAR:g} m from the {plate.foot} foot's markers in {far.sum()} of {loaded.sum()} "
             "loaded samples; set missing"

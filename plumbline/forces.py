@@ -3,33 +3,39 @@ r"""Forces at the frames' times: net ground reaction, CoP of each foot and ZMP, 
 Plates are usually faster than cameras. Each frame gets the average of the plate's linear interpolant over one frame's width
 *centred on the frame's time* (weights of a trapezoid, symmetric, hence without phase); slower or equally fast plates are
 interpolated. At the ends of the force record the window shrinks on both sides alike; outside of it the values are NaN. Forces and
-moments are averaged, and the CoP is formed from the averages.
+moments are averaged, the plates' wrenches are added, however small, and the CoP is formed from the sum: leaving out 8 of 700 N
+under a light foot would move the ZMP by 3 mm. Only a plate that stands empty counts as zero (``plumbline/contact.py``).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import oaconvolve
 
-from plumbline.filters import known, runs
+from plumbline import contact
+from plumbline.contact import Foot
+from plumbline.filters import known
+from plumbline.loads import LOADED, light_below, surface
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 MIN_LOAD = 20.0  # [N] vertical load below which a centre of pressure means nothing
-BROKEN = 0.05  # [1] of the largest load on any plate: more load than this without a CoP is a fault, not an empty plate
-EMPTY = 0.3  # [s] a plate that is light for longer stands empty
+ZERO = 1e-6  # [N], [N m] averages leave 1e-14 of zeros
 MIN_RATIO = 1.5  # [1] plate samples per frame from which on they are averaged
 
 
 class Plate(Protocol):
-    """A force plate in pipeline axes: reaction on the person [N], CoP [m] (NaN while unloaded), free moment [N m]."""
+    """A force plate in pipeline axes, as :class:`plumbline.loads.Plate`: reaction [N], its moment about the origin [N m], CoP [m]."""
 
+    number: int
     time: Array
     force: Array
+    moment: Array
     cop: Array
     free_moment: Array
     corners: Array | None
@@ -97,19 +103,22 @@ def _averaged(values: Array, ratio: float) -> Array:
     return out
 
 
-def net(plates: Sequence[Plate], frames: Array) -> Forces:
-    """Net and per-foot forces at the frames' times [s], shape (n,)."""
+def net(plates: Sequence[Plate], frames: Array, feet: Mapping[str, Foot] = MappingProxyType({})) -> Forces:
+    """Net and per-foot forces at the frames' times [s], shape (n,): sums of the plates' wrenches, empty plates as zero.
+
+    feet: side -> a foot's markers at the frames; without them an empty plate is told by its load (``plumbline/contact.py``).
+    """
     n = len(frames)
-    used = [p for p in plates if len(p.time) > 1 and known(p.cop).any()]
+    used = [p for p in plates if len(p.time) > 1 and (known(p.cop).any() or np.nanmax(p.force[:, 2], initial=0.0) > LOADED)]
     out = Forces(np.full((n, 3), np.nan), np.full((n, 3), np.nan), np.nan)
     if not used:
         return out
-    out.surface = _surface(used)
+    out.surface = surface(p.cop for p in used)
     if not any(np.isfinite(p.force[:, 2]).any() for p in used):
         out.zmp = _cop_only(used, frames, out.notes)
         return out
-    heavy = BROKEN * max(float(np.nanmax(p.force[:, 2])) for p in used if np.isfinite(p.force[:, 2]).any())
-    wrenches = [_at_frames(p, frames, heavy, out.notes) for p in used]
+    least = light_below(p.force for p in used)
+    wrenches = [_loads(p, frames, least, feet, out.notes) for p in used]
     out.grf, out.zmp = _sum(wrenches, used)
     for side in ("left", "right"):
         mine = [i for i, p in enumerate(used) if p.foot == side]
@@ -123,36 +132,44 @@ def _sum(wrenches: Sequence[Array], plates: Sequence[Plate]) -> tuple[Array, Arr
     total = np.sum(wrenches, axis=0)
     force = total[:, :3].copy()
     force[:, [bool(any(np.isnan(p.force[:, k]).all() for p in plates)) for k in range(3)]] = np.nan
-    return force, _cop(total, _surface(plates))
+    return force, _cop(total, surface(p.cop for p in plates))
 
 
-def _at_frames(plate: Plate, frames: Array, heavy: float, notes: list[str]) -> Array:
-    """Force and moment about the origin of one plate at the frames, (n, 6); moments are NaN where a loaded plate has no CoP.
+def _loads(plate: Plate, frames: Array, least: float, feet: Mapping[str, Foot], notes: list[str]) -> Array:
+    """Wrench of one plate at the frames (n, 6), zero where the plate is empty; what was taken as empty goes to `notes`."""
+    wrench = wrench_at(plate, frames)
+    lost = int((np.isnan(plate.moment).any(axis=1) & (plate.force[:, 2] >= least)).sum())
+    if lost:
+        notes.append(f"plate {plate.number}: loaded without a CoP in {lost} samples: no ZMP there")
+    load = wrench[:, 2]
+    light = load < least
+    standing = [feet[plate.foot]] if plate.foot in feet else list(feet.values()) if len(feet) == 2 else []
+    empty = contact.empty(load, light, standing, contact.area(plate.corners, plate.cop), frames)
+    reads = load[empty & (np.abs(wrench).max(axis=1) > ZERO)]
+    if reads.size:
+        why = "no foot is on it" if standing else "it reads the same, steady, at an end of the file"
+        notes.append(
+            f"plate {plate.number}: taken as empty in {reads.size} of {len(frames)} frames ({why}); mean {reads.mean():+.1f} N there"
+        )
+    kept = int((light & ~empty & (np.abs(load) > ZERO)).sum())
+    if kept and not standing:
+        notes.append(f"plate {plate.number}: light in {kept} of {len(frames)} frames, as a foot or as a zero error; counted as load")
+    wrench[empty] = 0.0
+    return wrench
 
-    A plate that stays light (no CoP, little load) for `EMPTY` counts as empty: zero, so that its zero error moves no CoP. In a
-    shorter dip the small load is kept and acts at the interpolated CoP: dropping 20 of 700 N would move the ZMP by millimetres.
+
+def wrench_at(plate: Plate, frames: Array) -> Array:
+    """Force [N] and moment about the origin [N m] of one plate at the frames, (n, 6).
+
+    Shear that is not recorded counts as none. Other missing samples make the frames they reach NaN.
     """
-    placed = known(plate.cop)
-    broken = ~placed & (plate.force[:, 2] > heavy)
-    empty = stays(~placed & ~broken, plate.time, EMPTY)
-    force = np.where(empty[:, None], 0.0, np.nan_to_num(plate.force))
-    cop = np.column_stack([np.interp(plate.time, plate.time[placed], plate.cop[placed, k]) for k in range(3)])
-    moment = np.cross(cop, force)
-    moment[:, 2] += np.nan_to_num(plate.free_moment)
-    out = at_frames(np.hstack([force, moment, broken[:, None]]), plate.time, frames)
-    if broken.any():
-        out[out[:, 6] > 1e-6, 3:6] = np.nan  # the convolution leaves 1e-17 elsewhere
-        notes.append(f"a loaded plate has no CoP in {broken.sum()} samples: no ZMP there")
-    return out[:, :6]
-
-
-def stays(flag: Mask, time: Array, least: float) -> Mask:
-    """`flag` (n,) without its stretches shorter than `least` [s]; stretches at an end of the record are kept."""
-    out = np.zeros(len(flag), dtype=bool)
-    for a, b in runs(flag):
-        if a == 0 or b == len(flag) or time[b - 1] - time[a] >= least:
-            out[a:b] = True
-    return out
+    wrench = np.hstack([plate.force, plate.moment])
+    wrench[:, :3][:, np.asarray(np.isnan(plate.force).all(axis=0))] = 0.0
+    gone = np.isnan(wrench)
+    out = at_frames(np.hstack([np.where(gone, 0.0, wrench), gone]), plate.time, frames)
+    values, touched = out[:, :6], out[:, 6:] > 1e-6  # the convolution leaves 1e-17 elsewhere
+    values[touched] = np.nan
+    return values
 
 
 def _cop(wrench: Array, height: float) -> Array:
@@ -161,11 +178,6 @@ def _cop(wrench: Array, height: float) -> Array:
     load = np.where(fz > MIN_LOAD, fz, np.nan)
     x, y = (height * fx - my) / load, (height * fy + mx) / load
     return np.column_stack([x, y, np.where(np.isfinite(x + y), height, np.nan)])
-
-
-def _surface(plates: Sequence[Plate]) -> float:
-    """Height of the plates [m]: mean over the plates of the median height of their CoP."""
-    return float(np.mean([np.nanmedian(p.cop[:, 2]) for p in plates]))
 
 
 def _cop_only(plates: Sequence[Plate], frames: Array, notes: list[str]) -> Array:

@@ -3,6 +3,7 @@
 Everything here is in the pipeline's axes (x right, y forward, z up), SI, unless a docstring says lab axes.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -27,6 +28,7 @@ class Plate:
     """One force plate: ground reaction on the person.
 
     number: from 1, in the file's order.  time: [s], shape (k,).  force: [N], shape (k, 3), NaN where not recorded.
+    moment: about the coordinates' origin [N m], shape (k, 3), kept however small the load; NaN where a load has no valid CoP.
     cop: on the plate's surface [m], shape (k, 3), NaN while unloaded.  free_moment: vertical, about the CoP [N m], shape (k,).
     corners: [m], shape (4, 3), or None.  foot: "left", "right" or "".
     """
@@ -34,6 +36,7 @@ class Plate:
     number: int
     time: Array
     force: Array
+    moment: Array
     cop: Array
     free_moment: Array
     corners: Array | None = None
@@ -115,17 +118,21 @@ def reaction(number: int, raw: RawPlate, matrix: Array, turn: bool = True) -> tu
     """One plate in the pipeline's axes with the sign that makes its vertical force a reaction, and that sign (+1 or -1).
 
     raw: lab axes.  matrix: pipeline from lab, shape (3, 3).  turn: False keeps the recorded sign (nobody on it).
-    Force and moment change sign together, so the CoP does not depend on it.
+    Force and moment change sign together, so the CoP does not depend on it. A light load whose place the file does not tell is
+    put at the plate's origin: 20 N there are nearer to the truth than none.
     """
-    force, moment, origin = turned(raw.force, matrix), turned(np.nan_to_num(raw.moment), matrix), turned(raw.origin, matrix)
+    force, moment, origin = turned(raw.force, matrix), turned(raw.moment, matrix), turned(raw.origin, matrix)
     corners = None if raw.corners is None else turned(raw.corners, matrix)
     up = np.nan_to_num(force[:, 2])
     on = np.abs(up) >= 0.5 * np.abs(up).max()
     sign = -1.0 if turn and np.median(up[on]) < 0 else 1.0
     force, moment = sign * force, sign * moment
-    surface = float(np.mean(corners[:, 2])) if corners is not None else float(origin[2])
-    cop, free = centre(force, moment, origin, surface)
-    return Plate(number, raw.time, force, cop, free, corners, raw.foot), sign
+    moment[np.isnan(moment).any(axis=1) & (np.abs(up) < COP_FORCE)] = 0.0
+    height = float(np.mean(corners[:, 2])) if corners is not None else float(origin[2])
+    cop, free = centre(force, moment, origin, height)
+    moment = moment + np.cross(origin, np.nan_to_num(force))
+    moment[np.isnan(force[:, 2])] = np.nan
+    return Plate(number, raw.time, force, moment, cop, free, corners, raw.foot), sign
 
 
 def centre(force: Array, moment: Array, origin: Array, surface: float) -> tuple[Array, Array]:
@@ -143,9 +150,23 @@ def centre(force: Array, moment: Array, origin: Array, surface: float) -> tuple[
     return np.column_stack([origin[0] + dx, origin[1] + dy, np.full(fz.size, surface)]), free
 
 
+def light_below(forces: Iterable[Array]) -> float:
+    """Vertical load [N] below which a plate has no CoP: 20 N, or 3 % of the largest load on any.  forces: each (k, 3)."""
+    return max([COP_FORCE, *(0.03 * float(np.nanmax(f[:, 2])) for f in forces if np.isfinite(f[:, 2]).any())])
+
+
+def turn_shear(plate: Plate) -> None:
+    """Give the shear and the free moment the other sign; the CoP stays where it is (in place)."""
+    shear = np.nan_to_num(plate.force[:, :2])
+    plate.moment += 2.0 * surface([plate.cop]) * np.column_stack([shear[:, 1], -shear[:, 0], 0.0 * shear[:, 0]])
+    plate.moment[:, 2] *= -1.0
+    plate.force[:, :2] *= -1.0
+    plate.free_moment *= -1.0
+
+
 def drop_light(plates: list[Plate]) -> None:
-    """CoP and free moment become NaN while a plate carries less than 20 N or 3 % of the largest load on any plate (in place)."""
-    least = max([COP_FORCE, *(0.03 * float(np.nanmax(p.force[:, 2])) for p in plates if np.isfinite(p.force[:, 2]).any())])
+    """CoP and free moment become NaN while a plate is light (in place); force and moment stay what they are."""
+    least = light_below(p.force for p in plates)
     for plate in plates:
         light = ~(plate.force[:, 2] >= least)
         plate.cop[light], plate.free_moment[light] = np.nan, np.nan
@@ -154,14 +175,20 @@ def drop_light(plates: list[Plate]) -> None:
 # -- all plates together ----------------------------------------------------------------------------------------------
 
 
+def surface(cops: Iterable[Array]) -> float:
+    """Height of several plates together [m]: mean of the median heights of their CoP (k, 3); NaN without any."""
+    heights = [float(np.nanmedian(cop[:, 2])) for cop in cops if np.isfinite(cop[:, 2]).any()]
+    return float(np.mean(heights)) if heights else float("nan")
+
+
 def total(plates: list[Plate]) -> tuple[Array, Array, Array]:
     """Time, net force (k, 3) and net CoP (k, 2) of plates with forces, on the time of the first; NaN shear stays NaN."""
     time = plates[0].time
     at = partial(_at, time)
     force = np.sum([at(p.time, p.force) for p in plates], axis=0)
-    pressed = np.sum([np.nan_to_num(at(p.time, p.cop[:, :2] * p.force[:, 2:3])) for p in plates], axis=0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return time, force, pressed / force[:, 2:3]
+    moment = np.sum([at(p.time, p.moment) for p in plates], axis=0)
+    cop, _ = centre(force, moment, np.zeros(3), surface(p.cop for p in plates))
+    return time, force, cop[:, :2]
 
 
 def _at(at: Array, time: Array, values: Array) -> Array:

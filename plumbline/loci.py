@@ -8,7 +8,10 @@ one locus where it starts away from rest. All is lateral (x). Position and veloc
 - *reference*: median position in the second before each push (where the mean speed there is below 5 cm/s), over the trial or
   between two `target` events; without such a stretch, of all frames that are slow; else of all frames.
 - *returned*: for 0.25 s the CoM stays within 2 cm of the reference at less than 5 cm/s.
-- *beyond*: at the start the CoM is outside the borders of the support, so that no ZMP can be outside of it.
+- *beyond*: at the start the CoM is outside the borders of the support, both feet's as long as both are on the floor, whatever
+  each bears (Murai 2013: loci that start with the CoM beyond the stance). No ZMP can be outside of it, the CoM accelerates
+  outwards, and only its velocity brings it back. A person's own limits of the ZMP lie a little inside the feet's outline and are
+  not known here: a start between the two counts as within.
 - `falling`: at its end the extrapolated CoM :math:`x + \dot x/\omega` (Hof 2005), :math:`\omega^2 = g/z`, lies outside the
   borders and moves outwards. Else `recovering`: returned; `recovering_from_beyond`: returned, and began beyond; `unrecovered`:
   neither, the next push or the end of the trial came first.

@@ -176,8 +176,7 @@ def _put_plates(out: Recording, raw: Raw, carrying: Mapping[int, RawPlate], foun
     out.notes += stand.notes
     if out.shear_sign < 0:
         for plate in out.plates:
-            plate.force[:, :2] *= -1.0
-            plate.free_moment *= -1.0
+            loads.turn_shear(plate)
 
 
 def climb(recording: Recording) -> float:
@@ -199,7 +198,7 @@ def _cop_alone(raw: Raw, matrix: Array) -> Plate:
     cop = np.column_stack([raw.channels[f"cop_{a}"] for a in "xyz"])
     cop[:, np.isnan(cop).all(axis=0)] = 0.0
     blank = np.full(cop.shape, np.nan)
-    return Plate(1, raw.time, blank, lab.turned(cop, matrix), blank[:, 0].copy())
+    return Plate(1, raw.time, blank, blank.copy(), lab.turned(cop, matrix), blank[:, 0].copy())
 
 
 # -- tables -----------------------------------------------------------------------------------------------------------
@@ -243,6 +242,7 @@ def to_tables(recording: Recording, raw: Path | None = None) -> tuple[dict[str, 
         "rate": r.rate, "force_rate": r.force_rate, "frames": int(r.time.size), "duration": float(r.time[-1] - r.time[0]),
         "markers": len(r.markers), "plates": len(r.plates), "missing": missing,
         "filled": sum(int(f.sum()) for f in r.filled.values()),
+        "corners": json.dumps([None if p.corners is None else p.corners.tolist() for p in r.plates]),
         "axes": r.axes, "axes_from": r.axes_from, "force_sign": r.force_sign, "shear_sign": r.shear_sign, "mass": r.mass,
         "notes": json.dumps(r.notes, ensure_ascii=False),
     }  # fmt: skip
@@ -260,32 +260,23 @@ def from_tables(row: Mapping[str, Any] | pd.Series, markers: pd.DataFrame, plate
     """The recording behind one row of `trials` and the rows of this trial in `markers` and `plates`."""
     name, subject, session, task, condition, run = (str(row[k]) for k in ("trial", "subject", "session", "task", "condition", "run"))
     trial = Trial(name, subject, session, task, condition, run, files=())
-    points = {
-        str(k): (v[["x", "y", "z"]].to_numpy(), v["filled"].to_numpy(), v["time"].to_numpy())
-        for k, v in markers.groupby("marker", sort=False, observed=True)
-    }
-    boards = [_plate_of(int(str(number)), part, points) for number, part in plates.groupby("plate", sort=False)]
-    framed = next((t for k, (_, _, t) in points.items() if ".corner" not in k), None)
+    rows_of = {str(k): v for k, v in markers.groupby("marker", sort=False, observed=True)}
+    points = {k: v[["x", "y", "z"]].to_numpy() for k, v in rows_of.items()}
+    parts = [(int(str(number)), part) for number, part in plates.groupby("plate", sort=False)]
+    corners = json.loads(row["corners"] or "[]")
+    boards = [_plate_of(number, part, c) for (number, part), c in zip(parts, corners, strict=True)]
     return Recording(
-        trial, framed if framed is not None else boards[0].time, float(row["rate"]),
-        {k: v for k, (v, _, _) in points.items() if not k.startswith("@")},
-        {k: f for k, (_, f, _) in points.items() if not k.startswith("@")},
-        {k[1:]: v for k, (v, _, _) in points.items() if k.startswith("@") and ".corner" not in k},
+        trial, next(iter(rows_of.values()))["time"].to_numpy() if rows_of else boards[0].time, float(row["rate"]),
+        {k: v for k, v in points.items() if not k.startswith("@")},
+        {k: v["filled"].to_numpy() for k, v in rows_of.items() if not k.startswith("@")},
+        {k[1:]: v for k, v in points.items() if k.startswith("@")},
         boards, float(row["mass"]), json.loads(row["notes"] or "[]"), str(row["axes"]), str(row["axes_from"]),
         float(row["force_sign"]), float(row["shear_sign"]),
         [(float(t), float(d), str(k)) for t, d, k in json.loads(row["events"] or "[]")],
     )  # fmt: skip
 
 
-def _plate_of(number: int, part: pd.DataFrame, points: Mapping[str, tuple[Array, Flags, Array]]) -> Plate:
-    corners = [points[name][0][0] for i in range(4) if (name := rows.CORNER.format(number, i + 1)) in points]
-    force, cop = (part[[f"{what}_{a}" for a in "xyz"]].to_numpy() for what in ("force", "cop"))
-    return Plate(
-        number,
-        part["time"].to_numpy(),
-        force,
-        cop,
-        part["moment_z"].to_numpy(),
-        np.array(corners) if corners else None,
-        str(part["foot"].iloc[0]),
-    )
+def _plate_of(number: int, part: pd.DataFrame, corners: list[list[float]] | None) -> Plate:
+    force, moment, cop = (part[[f"{what}_{a}" for a in "xyz"]].to_numpy() for what in ("force", "moment", "cop"))
+    free, foot = part["free_moment"].to_numpy(), str(part["foot"].iloc[0])
+    return Plate(number, part["time"].to_numpy(), force, moment, cop, free, None if corners is None else np.array(corners), foot)

@@ -9,12 +9,11 @@ import pandas as pd
 
 from plumbline import tables
 from plumbline.errors import Refused
+from plumbline.readers.raw import Array
 from plumbline.study import Trial
 
 if TYPE_CHECKING:
     from plumbline.recording import Recording
-
-CORNER = "@plate{}.corner{}"  # a plate's corner stands in the markers table as a derived point with one row (frame 0)
 
 
 def key_row(trial: Trial, raw: Path | None) -> dict[str, Any]:
@@ -63,31 +62,31 @@ def label_column(labels: list[str], lengths: list[int]) -> "pd.Categorical[str]"
 
 
 def marker_rows(r: "Recording") -> pd.DataFrame:
-    """Rows of `markers`: each marker and derived point over all frames, each plate corner once."""
+    """Rows of `markers`: each marker and derived point over all frames."""
     n = r.time.size
     blocks = [*r.markers.items(), *((f"@{label}", values) for label, values in r.derived.items())]
-    corners = [(CORNER.format(p.number, i + 1), p.corners[i : i + 1]) for p in r.plates if p.corners is not None for i in range(4)]
-    lengths = [n] * len(blocks) + [1] * len(corners)
-    xyz = np.concatenate([np.empty((0, 3)), *(v for _, v in blocks), *(v for _, v in corners)])
+    xyz = np.concatenate([np.empty((0, 3)), *(v for _, v in blocks)])
     filled = np.zeros(len(xyz), dtype=bool)
     filled[: n * len(r.markers)] = np.concatenate([np.empty(0, dtype=bool), *r.filled.values()])
-    frame = np.concatenate([np.tile(np.arange(n), len(blocks)), np.zeros(len(corners), dtype=np.int64)])
-    one = [sum(lengths)]
+    frame, one = np.tile(np.arange(n), len(blocks)), [n * len(blocks)]
     return pd.DataFrame(
         {
             "trial": label_column([r.trial.trial], one), "subject": label_column([r.trial.subject], one),
-            "frame": frame, "time": r.time[frame], "marker": label_column([k for k, _ in [*blocks, *corners]], lengths),
+            "frame": frame, "time": r.time[frame], "marker": label_column([k for k, _ in blocks], [n] * len(blocks)),
             "x": xyz[:, 0], "y": xyz[:, 1], "z": xyz[:, 2], "filled": filled,
         }
     )  # fmt: skip
+
+
+def _xyz(prefix: str, values: Array) -> dict[str, Array]:
+    return {f"{prefix}_{a}": values[:, i] for i, a in enumerate("xyz")}
 
 
 def plate_rows(r: "Recording") -> pd.DataFrame:
     """Rows of `plates`."""
     lengths = [p.time.size for p in r.plates]
     whole = [sum(lengths)]
-    force = np.concatenate([np.empty((0, 3)), *(p.force for p in r.plates)])
-    cop = np.concatenate([np.empty((0, 3)), *(p.cop for p in r.plates)])
+    force, moment, cop = (np.concatenate([np.empty((0, 3)), *(getattr(p, what) for p in r.plates)]) for what in ("force", "moment", "cop"))
     return pd.DataFrame(
         {
             "trial": label_column([r.trial.trial], whole), "subject": label_column([r.trial.subject], whole),
@@ -95,7 +94,7 @@ def plate_rows(r: "Recording") -> pd.DataFrame:
             "foot": label_column([p.foot for p in r.plates], lengths) if r.plates else label_column([""], [0]),
             "sample": np.concatenate([np.empty(0, dtype=np.int64), *(np.arange(k) for k in lengths)]),
             "time": np.concatenate([np.empty(0), *(p.time for p in r.plates)]),
-            **{f"force_{a}": force[:, i] for i, a in enumerate("xyz")}, **{f"cop_{a}": cop[:, i] for i, a in enumerate("xyz")},
-            "moment_z": np.concatenate([np.empty(0), *(p.free_moment for p in r.plates)]),
+            **_xyz("force", force), **_xyz("moment", moment), **_xyz("cop", cop),
+            "free_moment": np.concatenate([np.empty(0), *(p.free_moment for p in r.plates)]),
         }
     )  # fmt: skip

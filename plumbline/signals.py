@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from plumbline import body, filters, forces, noise_band, support
+from plumbline import body, contact, filters, forces, noise_band, support
 from plumbline.com_force import CROSSOVER, DEFAULT_HEIGHT, HEIGHT_SHARE, com_from_force
 from plumbline.errors import Refused
 from plumbline.forces import Forces, Plate
@@ -85,15 +85,16 @@ class _Made(NamedTuple):
 def _made(recording: Recording, participant: Participant, markerset: MarkerSet | None, subject_mass: float, notes: list[str]) -> _Made:
     time, nothing = recording.time, np.full((len(recording.time), 3), np.nan)
     mass = _mass(recording, subject_mass, participant, notes)
-    force = forces.net(recording.plates, time)
+    outline = support.feet(recording.markers, markerset) if markerset else {}
+    standing = contact.of_feet(recording.markers, outline, time)
+    force = forces.net(recording.plates, time, standing)
     frame = body.build(recording.markers, markerset, participant.sex) if markerset and recording.markers else None
     notes += force.notes + (frame.notes if frame else [])
     coms = {"table": frame.com() if frame else nothing, "lab": _lab(recording)}
     height = _height(coms, force, participant, notes)
     coms |= {"force": com_from_force(force.grf, force.zmp, time, mass, height), "none": nothing}
     method = next((m for m in ("table", "lab", "force") if filters.known(coms[m]).any()), "none")
-    outline = support.feet(recording.markers, markerset) if markerset else {}
-    border = support.limits(outline, markerset, force, recording.plates, time)
+    border = support.limits(outline, markerset, standing, force, recording.plates)
     notes.append(border.note)
     return _Made(mass, force, frame, coms, method, border)
 

@@ -1,4 +1,8 @@
-"""Borders of the support: from the feet's markers, else from the plates, else unknown."""
+"""Borders of the support: from the feet's markers, else from the plates, else unknown.
+
+A foot on the floor is support however little it bears: the person can shift the load to it. A foot that is off the floor
+(``plumbline/contact.py``) is none, unless its plate bears more than 80 N meanwhile (on tiptoe, with markers at the heel only).
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -7,10 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plumbline.body import points
-from plumbline.forces import EMPTY, MIN_LOAD, Forces, Plate, stays
+from plumbline.contact import Foot
+from plumbline.forces import Forces, Plate
+from plumbline.loads import LOADED
 from plumbline.markerset import MarkerSet
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 FOOT_HALF_WIDTH = 0.05  # [m] a foot's outline beside markers on its middle line; foot breadth is 0.055 of body height (Winter 2009)
 
@@ -43,30 +50,45 @@ def feet(markers: Mapping[str, Array], markerset: MarkerSet) -> dict[str, Array]
     return out
 
 
-def limits(outline: Mapping[str, Array], markerset: MarkerSet | None, forces: Forces, plates: Sequence[Plate], time: Array) -> Support:
-    """Support borders of each frame.
+def limits(
+    outline: Mapping[str, Array],
+    markerset: MarkerSet | None,
+    standing: Mapping[str, Foot],
+    forces: Forces,
+    plates: Sequence[Plate],
+) -> Support:
+    """Support borders of each of n frames; unknown in frames in which a foot that may stand is not seen.
 
-    outline: as :func:`feet` gives it.  A foot whose plate stays light does not count.  time: [s], shape (n,).
+    outline: as :func:`feet` gives it.  standing: side -> whether the foot is off the floor.
     """
+    n = len(forces.grf)
     if outline and markerset is not None:
         width = foot_markers(markerset)[1]
         note = f"support limits from the markers of {' and '.join(sorted(outline))} foot, widened by {width * 1000:.0f} mm"
-        return Support(_from_feet(outline, forces, width, time), "markers", note)
+        return Support(_from_feet(outline, standing, forces, width), "markers", note)
     corners = [p.corners for p in plates if p.corners is not None and np.isfinite(p.cop).any()]
     if corners:
         border = _box(np.concatenate(corners)[None])
-        return Support(np.repeat(border, len(time), axis=0), "plates", "support limits from the loaded plates' corners")
-    return Support(np.full((len(time), 4), np.nan), "none", "no foot markers and no plate corners: support limits unknown")
+        return Support(np.repeat(border, n, axis=0), "plates", "support limits from the loaded plates' corners")
+    return Support(np.full((n, 4), np.nan), "none", "no foot markers and no plate corners: support limits unknown")
 
 
-def _from_feet(outline: Mapping[str, Array], forces: Forces, width: float, time: Array) -> Array:
-    standing = []
+def _from_feet(outline: Mapping[str, Array], standing: Mapping[str, Foot], forces: Forces, width: float) -> Array:
+    down, unseen = [], np.zeros(len(forces.grf), dtype=bool)
     for side, xyz in outline.items():
         foot = np.array(xyz)
-        if side in forces.feet and len(outline) == 2:
-            foot[stays(forces.feet[side][0][:, 2] < MIN_LOAD, time, EMPTY)] = np.nan
-        standing.append(foot)
-    return _box(np.concatenate(standing, axis=1)) + width * np.array([-1.0, 1.0, -1.0, 1.0])
+        off = _off(side, standing, forces)
+        unseen |= ~off & np.isnan(foot[..., 0]).all(axis=1)
+        foot[off] = np.nan
+        down.append(foot)
+    box = _box(np.concatenate(down, axis=1)) + width * np.array([-1.0, 1.0, -1.0, 1.0])
+    return np.where(unseen[:, None], np.nan, box)
+
+
+def _off(side: str, standing: Mapping[str, Foot], forces: Forces) -> Mask:
+    """Frames in which a foot is off the floor, (n,)."""
+    off = standing[side].off if side in standing else np.zeros(len(forces.grf), dtype=bool)
+    return off & ~(forces.feet[side][0][:, 2] > LOADED) if side in forces.feet else off
 
 
 def _box(xyz: Array) -> Array:

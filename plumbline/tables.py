@@ -55,6 +55,7 @@ TABLES: dict[str, list[Column]] = {
         _c("duration", "float", "s", "last time minus first"),
         _c("markers", "int", "", "markers with any valid frame"),
         _c("plates", "int", "", "force plates that carry a load"),
+        _c("corners", "str", "", "corners of each of these plates [m], JSON list of four [x, y, z] or null"),
         _c("filled", "int", "", "marker samples filled across gaps"),
         _c("missing", "int", "", "marker samples still missing"),
         _c("axes", "str", "", "what the pipeline's axes are in the file, e.g. x=+Z y=+X z=+Y"),
@@ -84,8 +85,9 @@ TABLES: dict[str, list[Column]] = {
         _c("sample", "int", "", "from 0 within the trial"),
         _c("time", "float", "s", "the file's own time"),
         *_xyz("force", "N", "ground reaction on the person"),
+        *_xyz("moment", "N m", "its moment about the coordinates' origin, component about the axis; NaN where a load has no valid CoP"),
         *_xyz("cop", "m", "centre of pressure on the plate's surface; NaN while unloaded"),
-        _c("moment_z", "float", "N m", "free vertical moment about the CoP"),
+        _c("free_moment", "float", "N m", "vertical moment about the CoP; NaN while unloaded"),
     ],
     # -- signals: one row per frame
     "signals": [

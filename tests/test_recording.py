@@ -14,11 +14,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from plumbline import axes as lab
-from plumbline import tables
+from plumbline import loads, tables
 from plumbline.config import with_defaults
 from plumbline.errors import PlumblineError, Refused
 from plumbline.frames import fill
 from plumbline.physics import G
+from plumbline.readers.opensim import wrench
 from plumbline.readers.raw import Array, Raw, RawPlate
 from plumbline.recording import Recording, assemble, recordings, tables_of
 from plumbline.study import Trial, find
@@ -229,6 +230,41 @@ def test_cop_is_missing_while_a_plate_is_light() -> None:
     np.testing.assert_array_equal(np.isnan(made(raw).plates[0].cop[:, 0]), lift)
 
 
+def test_the_wrench_is_kept_however_light_the_load() -> None:
+    """The moment about the coordinates' origin is the recorded wrench in every sample, 3 N included."""
+    raw = person()
+    lift = (raw.plates[0].time > 4) & (raw.plates[0].time < 6)
+    raw.plates[0].force[lift], raw.plates[0].moment[lift] = 3.0, 0.5
+    for plate, got in zip(raw.plates, made(raw).plates, strict=True):
+        np.testing.assert_allclose(got.moment, plate.moment + np.cross(plate.origin, plate.force), atol=1e-9)
+
+
+def test_the_wrench_of_a_plate_without_corners_is_that_of_its_cop() -> None:
+    """With force and CoP alone the moment is CoP x force; without a CoP a load has no moment, and a light load is at the plate."""
+    force = np.tile([3.0, -4.0, 500.0], (2000, 1)) + np.random.default_rng(2).normal(size=(2000, 3))
+    force[50:60, 2] = 5.0
+    cop = np.tile([0.1, 0.2, 0.0], (2000, 1))
+    cop[40:60] = np.nan
+    origin, moment = wrench(force, cop, np.zeros_like(force))
+    plate, _ = loads.reaction(1, RawPlate(np.arange(2000) / 500, force, moment, origin, None, "text"), np.eye(3))
+    np.testing.assert_allclose(plate.moment[60:], np.cross(cop[60:], force[60:]))
+    assert np.isnan(plate.moment[40:50]).all()
+    np.testing.assert_allclose(plate.moment[50:60], np.cross(origin, force[50:60]))
+
+
+def test_turning_the_shear_leaves_the_cop() -> None:
+    """On a plate 0.3 m above the origin the shear, and with it the free moment, changes its sign and the CoP does not move."""
+    rng = np.random.default_rng(4)
+    force = rng.normal(size=(50, 3)) + np.array([0.0, 0.0, 500.0])
+    raw = RawPlate(np.arange(50) / 100, force, rng.normal(size=(50, 3)), np.array([0.1, 0.2, 0.3]), None, "type-2")
+    plate, _ = loads.reaction(1, raw, np.eye(3))
+    loads.turn_shear(plate)
+    cop, free = loads.centre(plate.force, plate.moment, np.zeros(3), 0.3)
+    np.testing.assert_allclose(plate.force, force * [-1, -1, 1])
+    np.testing.assert_allclose(cop, plate.cop)
+    np.testing.assert_allclose(free, plate.free_moment)
+
+
 def test_a_cop_no_foot_can_reach_is_dropped() -> None:
     """A CoP half a metre from the foot on that plate is set missing, counted in the notes."""
     raw = person()
@@ -237,7 +273,9 @@ def test_a_cop_no_foot_can_reach_is_dropped() -> None:
     raw.plates[0].moment[far, 0] += 0.9 * raw.plates[0].force[far, 2]
     recording = made(raw)
     assert np.isnan(recording.plates[0].cop[far]).all()
+    assert np.isnan(recording.plates[0].moment[far]).all()
     assert np.isfinite(recording.plates[0].cop[:1000]).all()
+    assert np.isfinite(recording.plates[0].moment[:1000]).all()
     assert any("100 of" in n for n in recording.notes)
 
 
@@ -486,7 +524,7 @@ def test_tables_hold_the_whole_recording(tmp_path: Path) -> None:
     np.testing.assert_array_equal(got.derived["CentreOfMass"], want.derived["CentreOfMass"])
     for a, b in zip(want.plates, got.plates, strict=True):
         assert (a.number, a.foot) == (b.number, b.foot)
-        for field in ("time", "force", "cop", "free_moment", "corners"):
+        for field in ("time", "force", "moment", "cop", "free_moment", "corners"):
             np.testing.assert_array_equal(getattr(a, field), getattr(b, field))
 
 
@@ -499,7 +537,7 @@ def test_a_refused_trial_is_a_row() -> None:
     assert rows.loc[1, "hint"]
     assert set(markers["trial"]) == set(plates["trial"]) == {"sub-01_task-quiet"}
     assert json.loads(rows.loc[0, "notes"])
-    assert len(markers) == 401 * 7 + 8  # seven markers and the corners of two plates
+    assert len(markers) == 401 * 7  # seven markers
 
 
 def test_nothing_at_all_still_makes_tables() -> None:

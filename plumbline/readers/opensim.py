@@ -234,10 +234,9 @@ def wrench(force: Array, point: Array, free: Array) -> tuple[Array, Array]:
     """A fixed origin on the plate and the moment about it, from points of application.
 
     force [N], point [m], free moment [N m], each of shape (k, 3).  origin: the median point under load, shape (3,).
-    moment = (point - origin) x force + free, shape (k, 3); shear that is not recorded (NaN) counts as none.
+    moment = (point - origin) x force + free, shape (k, 3), NaN without a point; shear that is not recorded (NaN) counts as none.
     """
     load = np.linalg.norm(np.nan_to_num(force), axis=1)
     on = (load > 0.2 * load.max()) & np.isfinite(point).all(axis=1)
     origin = np.median(point[on], axis=0) if on.any() else np.zeros(3)
-    arm = np.where(np.isfinite(point), point, origin) - origin
-    return origin, np.cross(arm, np.nan_to_num(force)) + free
+    return origin, np.cross(point - origin, np.nan_to_num(force)) + free
