@@ -11,9 +11,10 @@ import pandas as pd
 
 from plumbline.report import linked, methods, sheets, words
 
-DATA_FILES = ("page.html.j2", "page.css")
+DATA_FILES = ("page.html.j2", "page.css", "../../workflow/report/*.rst")  # the captions are those of the Snakemake report
 
 HERE = Path(__file__).parent
+CAPTIONS = HERE.parents[1] / "workflow" / "report"
 INLINE_PARTS = 3  # parts whose figures stand in the page; those of the others are linked
 STAGES = ("signals", "loci", "fit", "residuals")  # figures of a part, in the order data flow
 COHORT = {"where": "where/_all.svg", "ladder": "ladder.svg"}

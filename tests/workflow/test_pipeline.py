@@ -112,7 +112,7 @@ def test_an_unrelated_key_reruns_nothing_and_a_related_one_what_depends_on_it(sm
 
 def test_an_edited_module_reruns_what_depends_on_it(small: Path, tmp_path: Path) -> None:
     """A figure's module re-reads nothing; a model's module refits; a reader's module re-reads."""
-    repo, study = tmp_path / "repo", tmp_path / "study"
+    repo, study = tmp_path / "repo", tmp_path / small.name
     ignore = shutil.ignore_patterns(".venv", ".git", "results", "raw", ".snakemake", "studies", "__pycache__")
     shutil.copytree(REPO, repo, ignore=ignore)
     shutil.copytree(small, study)
@@ -136,7 +136,7 @@ def test_an_edited_module_reruns_what_depends_on_it(small: Path, tmp_path: Path)
 
 def test_inserting_a_subject_reruns_one_part(small: Path, tmp_path: Path) -> None:
     """sub-02 comes between sub-01 and sub-03: one job per stage and the cohort's rules."""
-    study = tmp_path / "study"
+    study = tmp_path / small.name
     shutil.copytree(small, study)
     assert jobs(study) == {}
     write_study(tmp_path / "more", [draw_subject("sub-02", seed=2)], trials=2, duration=7.0, seed=2)

@@ -17,7 +17,6 @@ rule report:
             part=PARTS,
         ),
         maps=["results/where/_all.svg", "results/ladder.svg"],
-        captions=sorted(str(f) for f in (REPO / "workflow" / "report").glob("*.rst")),
     output:
         report(
             "results/report.html",
