@@ -61,7 +61,7 @@ def setup() -> int:
             "-r",
             "requirements-uv.lock",
         ],
-        [uv, "pip", "install", "-q", "--python", python, "--require-hashes", "-r", "requirements.lock"],
+        [uv, "pip", "install", "-q", "--compile-bytecode", "--python", python, "--require-hashes", "-r", "requirements.lock"],
         [uv, "pip", "install", "-q", "--python", python, "--no-deps", "--no-build-isolation", "-e", "."],
     ]
     for step in steps:
