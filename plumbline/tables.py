@@ -299,7 +299,8 @@ def write(name: str, frame: pd.DataFrame, path: str | Path, stamp: Stamp = NO_ST
     target = Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
     temporary = target.with_name(f".{target.name}.{os.getpid()}")
-    pq.write_table(table, temporary, compression="zstd")
+    text = [c.name for c in TABLES[name] if c.kind == "str"]  # numbers hardly repeat: a dictionary of them only costs time
+    pq.write_table(table, temporary, compression="zstd", use_dictionary=text)
     temporary.replace(target)
 
 

@@ -127,7 +127,7 @@ def test_an_edited_module_reruns_what_depends_on_it(small: Path, tmp_path: Path)
         finally:
             file.write_text(text)
 
-    assert edited("figures/loci.py") == {"figures", "report"}
+    assert edited("figures/loci.py") == {"loci_figure", "report"}
     assert "fit" in edited("models/com_zmp.py")
     assert not edited("models/com_zmp.py") & {"recording", "signals", "loci"}
     assert {"recording", "signals", "fit", "report"} <= edited("readers/c3d.py")
@@ -142,7 +142,7 @@ def test_inserting_a_subject_reruns_one_part(small: Path, tmp_path: Path) -> Non
     write_study(tmp_path / "more", [draw_subject("sub-02", seed=2)], trials=2, duration=7.0, seed=2)
     shutil.copytree(tmp_path / "more" / "raw" / "sub-02", study / "raw" / "sub-02")
     ran = jobs(study)
-    assert all(ran[rule] == 1 for rule in ("recording", "signals", "loci", "fit", "residuals", "figures", "ladder"))
+    assert all(ran[rule] == 1 for rule in ("recording", "signals", "loci", "fit", "residuals", "loci_figure", "ladder"))
 
 
 def contents(folder: Path) -> dict[str, bytes]:

@@ -54,9 +54,12 @@ def trials(part):
     return [t for t in STUDY.trials if PART_OF[t.subject] == part]
 
 
-def code(script):
-    """Digest of a script and of the library modules it uses, transitively: edited code re-runs what depends on it."""
-    return digest(REPO / "scripts" / script)
+def code(script, *modules):
+    """Digest of a script and of the library modules it uses, transitively: edited code re-runs what depends on it.
+
+    modules: files of the library that the script imports by name.
+    """
+    return digest(REPO / "scripts" / script, *(REPO / "plumbline" / m for m in modules))
 
 
 def parts(table):

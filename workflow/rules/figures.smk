@@ -1,44 +1,86 @@
-# Figures: one job per part draws those of its tables, one draws those of the cohort. `_` keeps them out of the tables' folders.
-rule figures:
+# Figures: one job per part and stage, and one for the cohort. `_` keeps them out of the tables' folders.
+rule signals_figure:
     input:
         signals="results/signals/{part}.parquet",
-        coverage="results/coverage/{part}.parquet",
         pushes="results/pushes/{part}.parquet",
-        loci="results/loci/{part}.parquet",
-        fit="results/fit/{part}.parquet",
-        residuals="results/residuals/{part}.parquet",
+        coverage="results/coverage/{part}.parquet",
     output:
-        signals=report(
+        report(
             "results/signals/_{part}.svg",
             caption="../report/signals.rst",
             category="Recordings",
             labels={"figure": "From the recording to the CoM", "part": "{part}"},
         ),
-        loci=report(
+    params:
+        code=code("figure.py", "figures/signals.py"),
+        config={},
+        figure="signals",
+    log:
+        "results/logs/signals_figure/{part}.log",
+    script:
+        "../../scripts/figure.py"
+
+
+rule loci_figure:
+    input:
+        signals="results/signals/{part}.parquet",
+        loci="results/loci/{part}.parquet",
+        fit="results/fit/{part}.parquet",
+    output:
+        report(
             "results/loci/_{part}.svg",
             caption="../report/loci.rst",
             category="Recordings",
             labels={"figure": "Phase portrait of all loci", "part": "{part}"},
         ),
-        fit=report(
+    params:
+        code=code("figure.py", "figures/loci.py"),
+        config={},
+        figure="loci",
+    log:
+        "results/logs/loci_figure/{part}.log",
+    script:
+        "../../scripts/figure.py"
+
+
+rule fit_figure:
+    input:
+        fit="results/fit/{part}.parquet",
+    output:
+        report(
             "results/fit/_{part}.svg",
             caption="../report/fit.rst",
             category="Model",
             labels={"figure": "Natural frequency", "part": "{part}"},
         ),
-        residuals=report(
+    params:
+        code=code("figure.py", "figures/fit.py"),
+        config={},
+        figure="fit",
+    log:
+        "results/logs/fit_figure/{part}.log",
+    script:
+        "../../scripts/figure.py"
+
+
+rule residuals_figure:
+    input:
+        residuals="results/residuals/{part}.parquet",
+    output:
+        report(
             "results/residuals/_{part}.svg",
             caption="../report/residuals.rst",
             category="Model",
             labels={"figure": "Measured and modelled", "part": "{part}"},
         ),
-    log:
-        "results/logs/figures/{part}.log",
     params:
-        code=code("figures.py"),
+        code=code("figure.py", "figures/residuals.py"),
         config={},
+        figure="residuals",
+    log:
+        "results/logs/residuals_figure/{part}.log",
     script:
-        "../../scripts/figures.py"
+        "../../scripts/figure.py"
 
 
 rule maps:

@@ -14,5 +14,6 @@ rule fit:
         config=config["evaluation"],
     log:
         "results/logs/fit/{part}.log",
+    priority: 1  # the chain of stages before the figures beside it
     script:
         "../../scripts/fit.py"

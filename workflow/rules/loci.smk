@@ -12,5 +12,6 @@ rule loci:
         config={},
     log:
         "results/logs/loci/{part}.log",
+    priority: 1  # the chain of stages before the figures beside it
     script:
         "../../scripts/loci.py"

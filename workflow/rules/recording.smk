@@ -15,6 +15,7 @@ rule recording:
         columns=config["columns"],
     log:
         "results/logs/recording/{part}.log",
+    priority: 1  # the chain of stages before the figures beside it
     script:
         "../../scripts/recording.py"
 

@@ -14,5 +14,6 @@ rule residuals:
         config=config["evaluation"],
     log:
         "results/logs/residuals/{part}.log",
+    priority: 1  # the chain of stages before the figures beside it
     script:
         "../../scripts/residuals.py"

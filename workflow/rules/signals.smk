@@ -15,5 +15,6 @@ rule signals:
         people=lambda w: {s: vars(p) for s, p in STUDY.participants.items() if PART_OF.get(s) == w.part},
     log:
         "results/logs/signals/{part}.log",
+    priority: 1  # the chain of stages before the figures beside it
     script:
         "../../scripts/signals.py"
