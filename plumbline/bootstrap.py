@@ -74,12 +74,13 @@ def setup() -> int:
 
 def run(arguments: list[str]) -> int:
     """`run [STUDY] [snakemake options]`: make the demo's recordings where needed, run, and zip the Snakemake report."""
-    study = Path(arguments[0]) if arguments and not arguments[0].startswith("-") else REPO
-    options = arguments[1:] if study is not REPO else arguments
+    named = bool(arguments) and not arguments[0].startswith("-")
+    study = Path(arguments[0]).resolve() if named else REPO
+    options = arguments[1:] if named else arguments
     if not study.is_dir():
         print(f"{study}: no such folder; give the study's folder, e.g. make run STUDY=studies/pds", file=sys.stderr)
         return 2
-    demo = study.resolve() == REPO and not _recordings(REPO / "raw")
+    demo = study == REPO and not _recordings(REPO / "raw")
     if demo and (code := _call("plumbline", "demo", str(REPO / "raw"))):
         return code
     if not any(o.startswith(("-c", "-j", "--cores", "--jobs")) for o in options):
@@ -89,8 +90,11 @@ def run(arguments: list[str]) -> int:
         return code
     page, archive = study / "results" / "report.html", study / "results" / "report.zip"
     if page.is_file() and not (archive.is_file() and archive.stat().st_mtime >= page.stat().st_mtime):
-        code = _call("snakemake", *base, "--report", "results/report.zip", "--quiet", "all")
-        print(f"Report: {page}" if not code else "the Snakemake report could not be made", flush=True)
+        command = [str(BIN / _exe("snakemake")), *base, "--report", "results/report.zip", "--quiet", "all"]
+        done = subprocess.run(command, cwd=REPO, capture_output=True, text=True)
+        # its page generator warns of file names that begin with `_`; only a failure is worth showing
+        print(f"Report: {page}" if not done.returncode else f"the Snakemake report could not be made:\n{done.stderr}", flush=True)
+        return done.returncode
     return 0
 
 

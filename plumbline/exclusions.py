@@ -14,7 +14,7 @@ def exclusions(trials: pd.DataFrame, unused: Iterable[Exclusion]) -> pd.DataFram
     trials: the table of all parts.  unused: files that no trial uses, from `study.find`.
     """
     rows = [(e.file, e.reason, e.message, e.hint) for e in unused]
-    for t in trials[trials["reason"] != ""].itertuples():
-        rows += [(file, t.reason, t.message, t.hint) for file in str(t.files).split(" + ")]
+    for _, t in trials[trials["reason"] != ""].iterrows():
+        rows += [(file, str(t["reason"]), str(t["message"]), str(t["hint"])) for file in str(t["files"]).split(" + ")]
     assert all(r[1] in REASONS for r in rows), "reason codes are a closed list"
     return pd.DataFrame(sorted(rows), columns=["file", "reason", "message", "hint"])

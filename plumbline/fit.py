@@ -183,7 +183,7 @@ def folds(mine: Sequence[Windows], evaluation: Mapping[str, Any]) -> Iterator[tu
     if number < 2:
         return
     for k in range(number):
-        yield k + 1, [w for i, w in enumerate(mine) if i % number != k], mine[k::number]
+        yield k + 1, [w for i, w in enumerate(mine) if i % number != k], list(mine[k::number])
 
 
 def _w2(w: Windows, fitted: float, evaluation: Mapping[str, Any]) -> float:

@@ -26,7 +26,7 @@ def residuals(
     Every trial is seen with the w2 that was found without it (table `heldout`); trials that no fold judged are left out there
     and here alike.
     """
-    known = {(r.trial, r.axis): (r.w2, r.offset) for r in heldout.itertuples()}
+    known = {(r["trial"], r["axis"]): (float(r["w2"]), float(r["offset"])) for _, r in heldout.iterrows()}
     frames: list[pd.DataFrame] = []
     maps: list[pd.DataFrame] = []
     for w in windows(signals, pushes, loci, coverage, evaluation):

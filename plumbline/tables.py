@@ -275,7 +275,7 @@ def schema(name: str) -> pa.Schema:
 
 def empty(name: str) -> pd.DataFrame:
     """A table without rows."""
-    return schema(name).empty_table().to_pandas()
+    return pd.DataFrame(schema(name).empty_table().to_pandas())
 
 
 NO_STAMP = Stamp()
@@ -308,7 +308,7 @@ def read(name: str, path: str | Path, columns: list[str] | None = None) -> pd.Da
     """Read one file of a table, or of some of its columns."""
     if about(path).get("table") != name:
         raise PlumblineError(f"{path} is no table '{name}'; delete results/ and run again")
-    return pq.read_table(path, columns=columns).to_pandas()
+    return pd.DataFrame(pq.read_table(path, columns=columns).to_pandas())
 
 
 def read_all(name: str, paths: Iterable[str | Path], columns: list[str] | None = None) -> pd.DataFrame:

@@ -1,4 +1,4 @@
-# What every rule file uses: the validated config, the study, its parts, the digest of the code behind a script.
+# What all rule files use: the validated config, the study, its parts, the digest of the code behind a script.
 import os
 import sys
 from pathlib import Path
@@ -14,9 +14,7 @@ from plumbline.errors import PlumblineError
 from plumbline.provenance import digest
 
 # numbers, fonts and file bytes must not depend on the machine's load or clock
-os.environ.update(
-    OPENBLAS_NUM_THREADS="1", OMP_NUM_THREADS="1", MKL_NUM_THREADS="1", SOURCE_DATE_EPOCH="0", MPLBACKEND="agg"
-)
+os.environ.update(OPENBLAS_NUM_THREADS="1", OMP_NUM_THREADS="1", MKL_NUM_THREADS="1", SOURCE_DATE_EPOCH="0", MPLBACKEND="agg")
 
 if Path("config.yaml").is_file() and yaml.safe_load(Path("config.yaml").read_text(encoding="utf-8")):
 

@@ -11,12 +11,12 @@ rule signals_figure:
             category="Recordings",
             labels={"figure": "From the recording to the CoM", "part": "{part}"},
         ),
+    log:
+        "results/logs/signals_figure/{part}.log",
     params:
         code=code("figure.py", "figures/signals.py"),
         config={},
         figure="signals",
-    log:
-        "results/logs/signals_figure/{part}.log",
     script:
         "../../scripts/figure.py"
 
@@ -33,12 +33,12 @@ rule loci_figure:
             category="Recordings",
             labels={"figure": "Phase portrait of all loci", "part": "{part}"},
         ),
+    log:
+        "results/logs/loci_figure/{part}.log",
     params:
         code=code("figure.py", "figures/loci.py"),
         config={},
         figure="loci",
-    log:
-        "results/logs/loci_figure/{part}.log",
     script:
         "../../scripts/figure.py"
 
@@ -53,12 +53,12 @@ rule fit_figure:
             category="Model",
             labels={"figure": "Natural frequency", "part": "{part}"},
         ),
+    log:
+        "results/logs/fit_figure/{part}.log",
     params:
         code=code("figure.py", "figures/fit.py"),
         config={},
         figure="fit",
-    log:
-        "results/logs/fit_figure/{part}.log",
     script:
         "../../scripts/figure.py"
 
@@ -73,12 +73,12 @@ rule residuals_figure:
             category="Model",
             labels={"figure": "Measured and modelled", "part": "{part}"},
         ),
+    log:
+        "results/logs/residuals_figure/{part}.log",
     params:
         code=code("figure.py", "figures/residuals.py"),
         config={},
         figure="residuals",
-    log:
-        "results/logs/residuals_figure/{part}.log",
     script:
         "../../scripts/figure.py"
 

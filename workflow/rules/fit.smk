@@ -9,11 +9,11 @@ rule fit:
     output:
         fit="results/fit/{part}.parquet",
         heldout="results/heldout/{part}.parquet",
-    params:
-        code=code("fit.py"),
-        config=config["evaluation"],
     log:
         "results/logs/fit/{part}.log",
     priority: 1  # the chain of stages before the figures beside it
+    params:
+        code=code("fit.py"),
+        config=config["evaluation"],
     script:
         "../../scripts/fit.py"

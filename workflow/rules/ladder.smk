@@ -6,11 +6,11 @@ rule ladder:
     output:
         ladder="results/ladder.parquet",
         verdict="results/verdict.json",
+    log:
+        "results/logs/ladder.log",
     params:
         code=code("ladder.py"),
         config=config["evaluation"],
         csv=config["csv"],
-    log:
-        "results/logs/ladder.log",
     script:
         "../../scripts/ladder.py"

@@ -7,11 +7,11 @@ rule loci:
     output:
         loci="results/loci/{part}.parquet",
         pushes="results/pushes/{part}.parquet",
-    params:
-        code=code("loci.py"),
-        config={},
     log:
         "results/logs/loci/{part}.log",
     priority: 1  # the chain of stages before the figures beside it
+    params:
+        code=code("loci.py"),
+        config={},
     script:
         "../../scripts/loci.py"

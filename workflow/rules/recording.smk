@@ -6,6 +6,9 @@ rule recording:
         trials="results/trials/{part}.parquet",
         markers="results/markers/{part}.parquet",
         plates="results/plates/{part}.parquet",
+    log:
+        "results/logs/recording/{part}.log",
+    priority: 1  # the chain of stages before the figures beside it
     params:
         code=code("recording.py"),
         config=config["recording"],
@@ -13,9 +16,6 @@ rule recording:
         raw=str(STUDY.raw),
         axes=config["axes"],
         columns=config["columns"],
-    log:
-        "results/logs/recording/{part}.log",
-    priority: 1  # the chain of stages before the figures beside it
     script:
         "../../scripts/recording.py"
 
@@ -26,12 +26,12 @@ rule exclusions:
         parts("trials"),
     output:
         "results/exclusions.parquet",
+    log:
+        "results/logs/exclusions.log",
     params:
         code=code("exclusions.py"),
         config={},
         unused=[list(vars(e).values()) for e in STUDY.exclusions],
         csv=config["csv"],
-    log:
-        "results/logs/exclusions.log",
     script:
         "../../scripts/exclusions.py"

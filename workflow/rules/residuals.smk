@@ -9,11 +9,11 @@ rule residuals:
     output:
         residuals="results/residuals/{part}.parquet",
         where="results/where/{part}.parquet",
-    params:
-        code=code("residuals.py"),
-        config=config["evaluation"],
     log:
         "results/logs/residuals/{part}.log",
     priority: 1  # the chain of stages before the figures beside it
+    params:
+        code=code("residuals.py"),
+        config=config["evaluation"],
     script:
         "../../scripts/residuals.py"

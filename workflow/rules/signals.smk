@@ -8,13 +8,13 @@ rule signals:
     output:
         signals="results/signals/{part}.parquet",
         coverage="results/coverage/{part}.parquet",
+    log:
+        "results/logs/signals/{part}.log",
+    priority: 1  # the chain of stages before the figures beside it
     params:
         code=code("signals.py"),
         config=config["signals"],
         markerset=config["markerset"],
         people=lambda w: {s: vars(p) for s, p in STUDY.participants.items() if PART_OF.get(s) == w.part},
-    log:
-        "results/logs/signals/{part}.log",
-    priority: 1  # the chain of stages before the figures beside it
     script:
         "../../scripts/signals.py"
