@@ -102,6 +102,16 @@ def papers() -> None:
         raise click.exceptions.Exit(1)
 
 
+@main.command()
+@click.argument("name")
+def freeze(name: str) -> None:
+    """Renew the committed reference of studies/NAME from its results; look at the difference before you commit it."""
+    from plumbline.papers import freeze_all
+
+    for line in freeze_all(REPO / "studies" / name / "reference"):
+        click.echo(line)
+
+
 @main.command(hidden=True)
 def lint() -> None:
     """Snakemake's own lint, without its wish for conda environments (the lock pins them)."""

@@ -55,6 +55,17 @@ def compare(reference: Path, result: Path, about: dict[str, Any]) -> Iterator[tu
         )
 
 
+def freeze_all(folder: Path) -> Iterator[str]:
+    """Write every table of a reference anew from its results; yields lines to print.  folder: studies/NAME/reference."""
+    file = folder / "reference.yaml"
+    if not file.is_file():
+        raise PlumblineError(f"{file} is not there: it says which tables and columns a reference holds")
+    about = yaml.safe_load(file.read_text(encoding="utf-8"))
+    for name, table in about["tables"].items():
+        freeze(folder / f"{name}.csv", (folder / about["results"]).resolve() / table["file"], table)
+        yield f"{folder / name}.csv"
+
+
 def freeze(reference: Path, result: Path, about: dict[str, Any]) -> None:
     """Write a reference from a result: the named keys and columns, 12 digits."""
     table = pd.read_parquet(result)[[*about["keys"], *about["columns"]]]

@@ -1,28 +1,17 @@
 """The workflow as a user runs it: a small study from raw files to the report, re-runs, parts, bad input."""
 
 import json
-import os
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pandas as pd
 import pyarrow.parquet as pq
 import pytest
+from running import REPO, snakemake
 
 from plumbline import tables
 from plumbline.simulate.person import draw_subject
 from plumbline.simulate.study import write_study
-
-REPO = Path(__file__).resolve().parents[2]
-SNAKEMAKE = Path(sys.executable).with_name("snakemake")
-ENVIRONMENT = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1"}
-
-
-def snakemake(study: Path, *options: str, repo: Path = REPO, cores: int = 2) -> subprocess.CompletedProcess[str]:
-    command = [str(SNAKEMAKE), "-s", str(repo / "Snakefile"), "-d", str(study), f"-c{cores}", *options]
-    return subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT, timeout=300)
 
 
 def jobs(study: Path, repo: Path = REPO) -> dict[str, int]:

@@ -1,4 +1,4 @@
-# What all rule files use: the validated config, the study, its parts, the digest of the code behind a script.
+# Shared by all rules - the validated config, the study, its parts, the digest of the code behind a script.
 import os
 import sys
 from pathlib import Path
