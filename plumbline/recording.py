@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from plumbline import axes as lab
-from plumbline import feet, frames, loads, rows
+from plumbline import feet, frames, loads, rows, tables
 from plumbline.errors import PlumblineError, Refused
 from plumbline.events import Event, read_events
 from plumbline.frames import Flags
@@ -206,7 +206,7 @@ def _cop_alone(raw: Raw, matrix: Array) -> Plate:
 Tables = tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]
 
 
-def tables_of(
+def each(
     trials: Iterable[Trial],
     *,
     columns: Sequence[Mapping[str, Any]] = (),
@@ -214,22 +214,25 @@ def tables_of(
     max_gap: float = 0.1,  # [s]
     raw: Path | None = None,
     read: Reader = read_file,
-) -> Tables:
-    """Tables `trials`, `markers` and `plates` of many trials; a refused trial is a row of `trials` with its reason.
+) -> Iterator[tuple[dict[str, Any], pd.DataFrame, pd.DataFrame]]:
+    """One trial after the other: its row of `trials` and its rows of `markers` and `plates`.
 
-    raw: the folder below which `files` are named; without it by their names alone.  Other arguments as in `assemble`.
+    A refused trial has a row with its reason, and no others.  raw: the folder below which `files` are named; without it by their
+    names alone.  Other arguments as in `assemble`.
     """
-    lines, markers, plates = [], [], []
     for trial in trials:
         try:
             recording = assemble(trial, columns=columns, axes=axes, max_gap=max_gap, read=read)
         except Refused as refusal:
-            lines.append(rows.refused_row(trial, refusal, raw))
-            continue
-        row, of_markers, of_plates = to_tables(recording, raw)
-        lines.append(row)
-        markers.append(of_markers)
-        plates.append(of_plates)
+            yield rows.refused_row(trial, refusal, raw), tables.empty("markers"), tables.empty("plates")
+        else:
+            yield to_tables(recording, raw)
+
+
+def tables_of(trials: Iterable[Trial], **options: Any) -> Tables:
+    """Tables `trials`, `markers` and `plates` of some trials in memory; arguments as in `each`."""
+    found = list(each(trials, **options))
+    lines, markers, plates = [f[0] for f in found], [f[1] for f in found], [f[2] for f in found]
     return rows.table("trials", lines), rows.joined("markers", markers), rows.joined("plates", plates)
 
 
@@ -249,11 +252,13 @@ def to_tables(recording: Recording, raw: Path | None = None) -> tuple[dict[str, 
     return row, rows.marker_rows(r), rows.plate_rows(r)
 
 
-def recordings(trials: pd.DataFrame, markers: pd.DataFrame, plates: pd.DataFrame) -> Iterator[Recording]:
-    """The recordings behind the tables, in the order of `trials`; refused trials are passed over (their row holds the reason)."""
-    of_markers, of_plates = (dict(iter(t.groupby("trial", sort=False, observed=True))) for t in (markers, plates))
+def recordings(trials: pd.DataFrame, rows_of: Callable[[str, str], pd.DataFrame]) -> Iterator[Recording]:
+    """The recordings behind the tables, in the order of `trials`; refused trials are passed over (their row holds the reason).
+
+    rows_of: (name of a table, trial) -> its rows, so that one trial at a time is in memory.
+    """
     for _, row in trials[trials["reason"] == ""].iterrows():
-        yield from_tables(row, of_markers.get(row["trial"], markers[:0]), of_plates.get(row["trial"], plates[:0]))
+        yield from_tables(row, rows_of("markers", row["trial"]), rows_of("plates", row["trial"]))
 
 
 def from_tables(row: Mapping[str, Any] | pd.Series, markers: pd.DataFrame, plates: pd.DataFrame) -> Recording:

@@ -258,21 +258,20 @@ def _limitations(recording: Recording, frame: body.Body | None, force: Forces, m
 
 
 def of_part(
-    recordings: Iterable[Recording], people: Mapping[str, Participant], markers: str, *, cutoff: float
+    recordings: Iterable[Recording], people: Mapping[str, Participant], markers: str, *, cutoff: float, masses: Mapping[str, float]
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Tables `signals` and `coverage` of whole subjects.
 
     people: rows of participants.tsv by subject.  markers: path of a markerset.yaml, the name of a built-in set, or "auto".
-    A subject's mass is the median of what the plates say in its trials. A trial that is too slow for the cut-off has a row in
-    `coverage` that says so, and no signals.
+    masses: from `subject_masses`.  A trial that is too slow for the cut-off has a row in `coverage` that says so, and no signals.
     """
-    frames, rows, mine = [], [], list(recordings)
-    masses = _subject_masses(mine)
-    for recording in mine:
-        person = people.get(recording.trial.subject, Participant(recording.trial.subject))
+    frames, rows = [], []
+    for recording in recordings:
+        subject = recording.trial.subject
+        person = people.get(subject, Participant(subject))
         chosen = choose(markers, recording.markers)
         try:
-            made = signals(recording, person, chosen, cutoff=cutoff, subject_mass=masses[recording.trial.subject])
+            made = signals(recording, person, chosen, cutoff=cutoff, subject_mass=masses.get(subject, math.nan))
         except Refused as refusal:
             rows.append(_no_signals(recording.trial, cutoff, refusal))
             continue
@@ -281,15 +280,13 @@ def of_part(
     return _joined("signals", frames), _joined("coverage", [pd.DataFrame(rows)] if rows else [])
 
 
+def subject_masses(trials: pd.DataFrame) -> dict[str, float]:
+    """Body mass of each subject [kg]: the median of what the plates say in its trials (columns `subject`, `mass`); NaN where none does."""
+    return {str(s): float(m) for s, m in trials.groupby("subject")["mass"].median().items()}
+
+
 def _joined(name: str, parts: Sequence[pd.DataFrame]) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True) if parts else empty(name)
-
-
-def _subject_masses(recordings: Iterable[Recording]) -> dict[str, float]:
-    by_subject: dict[str, list[float]] = {}
-    for r in recordings:
-        by_subject.setdefault(r.trial.subject, []).append(r.mass)
-    return {s: float(np.nanmedian(m)) if np.isfinite(m).any() else math.nan for s, m in by_subject.items()}
 
 
 def _no_signals(trial: Trial, cutoff: float, refusal: Refused) -> dict[str, Any]:

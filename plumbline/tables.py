@@ -281,34 +281,53 @@ def empty(name: str) -> pd.DataFrame:
 NO_STAMP = Stamp()
 
 
-def write(name: str, frame: pd.DataFrame, path: str | Path, stamp: Stamp = NO_STAMP) -> None:
-    """Write a table under a temporary name and rename it, so that a killed job leaves no half file.
+class Writer:
+    """Writes a table piece by piece, so that a part need not fit into memory.
 
-    Raises PlumblineError where the columns are not those of :data:`TABLES`.
+    The file gets its name when the block ends well: a killed job leaves no half file.
     """
-    if frame.empty and not len(frame.columns):
-        frame = empty(name)
-    want, have = [c.name for c in TABLES[name]], list(frame.columns)
-    if set(want) != set(have):
-        raise PlumblineError(
-            f"table {name}: missing columns {sorted(set(want) - set(have))}, unknown columns {sorted(set(have) - set(want))}"
-        )
-    table = pa.Table.from_pandas(frame[want], schema=schema(name), preserve_index=False)
-    about = {"table": name, "code": stamp.code, "config": stamp.config or {}}
-    table = table.replace_schema_metadata({"plumbline": json.dumps(about, sort_keys=True)})
-    target = Path(path)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    temporary = target.with_name(f".{target.name}.{os.getpid()}")
-    text = [c.name for c in TABLES[name] if c.kind == "str"]  # numbers hardly repeat: a dictionary of them only costs time
-    pq.write_table(table, temporary, compression="zstd", use_dictionary=text)
-    temporary.replace(target)
+
+    def __init__(self, name: str, path: str | Path, stamp: Stamp = NO_STAMP) -> None:
+        self.name, self.target = name, Path(path)
+        self.temporary = self.target.with_name(f".{self.target.name}.{os.getpid()}")
+        about = {"table": name, "code": stamp.code, "config": stamp.config or {}}
+        self.schema = schema(name).with_metadata({"plumbline": json.dumps(about, sort_keys=True)})
+
+    def __enter__(self) -> "Writer":
+        self.target.parent.mkdir(parents=True, exist_ok=True)
+        text = [c.name for c in TABLES[self.name] if c.kind == "str"]  # numbers hardly repeat: a dictionary of them only costs time
+        self.file = pq.ParquetWriter(self.temporary, self.schema, compression="zstd", use_dictionary=text)
+        return self
+
+    def append(self, frame: pd.DataFrame) -> None:
+        """Add rows.  Raises PlumblineError where the columns are not those of :data:`TABLES`."""
+        want, have = self.schema.names, list(frame.columns)
+        if set(want) != set(have):
+            lacks, more = sorted(set(want) - set(have)), sorted(set(have) - set(want))
+            raise PlumblineError(f"table {self.name}: missing columns {lacks}, unknown columns {more}")
+        self.file.write_table(pa.Table.from_pandas(frame[want], schema=self.schema, preserve_index=False))
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        self.file.close()
+        if kind is None:
+            self.temporary.replace(self.target)
+        else:
+            self.temporary.unlink()
 
 
-def read(name: str, path: str | Path, columns: list[str] | None = None) -> pd.DataFrame:
-    """Read one file of a table, or of some of its columns."""
+def write(name: str, frame: pd.DataFrame, path: str | Path, stamp: Stamp = NO_STAMP) -> None:
+    """Write a whole table.  Raises PlumblineError where the columns are not those of :data:`TABLES`."""
+    with Writer(name, path, stamp) as out:
+        if len(frame.columns):
+            out.append(frame)
+
+
+def read(name: str, path: str | Path, columns: list[str] | None = None, trial: str = "") -> pd.DataFrame:
+    """Read one file of a table: all of it, some of its columns, or the rows of one trial."""
     if about(path).get("table") != name:
         raise PlumblineError(f"{path} is no table '{name}'; delete results/ and run again")
-    return pd.DataFrame(pq.read_table(path, columns=columns).to_pandas())
+    chosen = [("trial", "=", trial)] if trial else None
+    return pd.DataFrame(pq.read_table(path, columns=columns, filters=chosen).to_pandas())
 
 
 def read_all(name: str, paths: Iterable[str | Path], columns: list[str] | None = None) -> pd.DataFrame:

@@ -4,14 +4,15 @@ from snakemake.iocontainers import Snakemake
 
 from plumbline import job, tables
 from plumbline.recording import recordings
-from plumbline.signals import of_part
+from plumbline.signals import of_part, subject_masses
 from plumbline.study import Participant
 
 snakemake: Snakemake
 stamp = job.start(snakemake)
-read = [tables.read(n, snakemake.input[n]) for n in ("trials", "markers", "plates")]
+inputs, trials = snakemake.input, tables.read("trials", snakemake.input.trials)
 people = {s: Participant(**p) for s, p in snakemake.params.people.items()}
-marker_set = str(snakemake.input.markerset[0]) if snakemake.input.markerset else snakemake.params.markerset
-signals, coverage = of_part(recordings(*read), people, marker_set, **snakemake.params.config)
+marker_set = str(inputs.markerset[0]) if inputs.markerset else snakemake.params.markerset
+found = recordings(trials, lambda name, trial: tables.read(name, inputs[name], trial=trial))
+signals, coverage = of_part(found, people, marker_set, masses=subject_masses(trials), **snakemake.params.config)
 tables.write("signals", signals, snakemake.output.signals, stamp)
 tables.write("coverage", coverage, snakemake.output.coverage, stamp)

@@ -30,7 +30,11 @@ class Result:
         study = find(folder)
         recordings = [assemble(t) for t in study.trials]
         self.axes = {r.axes for r in recordings}
-        signals, coverage = signals_stage.of_part(recordings, study.participants, str(study.markerset), cutoff=2.0)
+        masses = signals_stage.subject_masses(
+            pd.DataFrame({"subject": [r.trial.subject for r in recordings], "mass": [r.mass for r in recordings]})
+        )
+        options = {"cutoff": 2.0, "masses": masses}
+        signals, coverage = signals_stage.of_part(recordings, study.participants, str(study.markerset), **options)
         events = [{"trial": r.trial.trial, "events": json.dumps([list(e) for e in r.events])} for r in recordings]
         self.loci, pushes = loci_stage.of_part(signals, coverage, pd.DataFrame(events))
         self.signals, self.coverage = signals, coverage

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 import yaml
 from hypothesis import given, settings
@@ -511,7 +512,8 @@ def test_tables_hold_the_whole_recording(tmp_path: Path) -> None:
     made_tables = tables_of([trial(), other], read=given_raw(raw), raw=Path("/nowhere"))
     for name, table in zip(("trials", "markers", "plates"), made_tables, strict=True):
         tables.write(name, table, tmp_path / f"{name}.parquet")
-    back = list(recordings(*(tables.read(name, tmp_path / f"{name}.parquet") for name in ("trials", "markers", "plates"))))
+    stored = tables.read("trials", tmp_path / "trials.parquet")
+    back = list(recordings(stored, lambda name, trial: tables.read(name, tmp_path / f"{name}.parquet", trial=trial)))
     assert [r.trial.subject for r in back] == ["sub-01", "sub-02"]
     want, got = made(raw), back[0]
     assert (got.rate, got.mass, got.axes, got.axes_from, got.notes) == (want.rate, want.mass, want.axes, want.axes_from, want.notes)
@@ -554,7 +556,12 @@ def study(name: str, shared_data: Path) -> dict[str, Recording]:
     config = with_defaults(yaml.safe_load((STUDIES / name / "config.yaml").read_text(encoding="utf-8")))
     got = tables_of(find(STUDIES / name, str(shared_data / name)).trials, columns=config["columns"], axes=config["axes"])
     used = got[0][got[0]["reason"] == ""]
-    return dict(zip(used["files"], recordings(*got), strict=True))
+    made_tables = {"markers": got[1], "plates": got[2]}
+
+    def rows_of(name: str, trial: str) -> pd.DataFrame:
+        return made_tables[name][made_tables[name]["trial"] == trial]
+
+    return dict(zip(used["files"], recordings(got[0], rows_of), strict=True))
 
 
 def test_the_same_authors_with_opposite_shear(shared_data: Path) -> None:

@@ -11,7 +11,7 @@ from made_recording import SOMEBODY, TRIAL, Plate, Recording, columns, pendulum,
 from plumbline import tables
 from plumbline.markerset import MarkerSet, load, match, named, parse
 from plumbline.physics import G
-from plumbline.signals import Signals, of_part, signals
+from plumbline.signals import Signals, of_part, signals, subject_masses
 from plumbline.study import Participant, Trial
 
 
@@ -201,14 +201,15 @@ def test_a_part_holds_all_its_trials(tmp_path: Path) -> None:
     second = replace(person(), mass=float("nan"), trial=replace(TRIAL, trial="second"))
     slow = replace(person(), trial=replace(TRIAL, trial="slow"))
     slow.time, slow.rate = slow.time * 50.0, 2.0
-    frames, coverage = of_part([person(), second, slow], {"sub-01": SOMEBODY}, "auto", cutoff=2.0)
+    masses = subject_masses(pd.DataFrame({"subject": "sub-01", "mass": [person().mass, float("nan"), 71.0, 69.0]}))
+    frames, coverage = of_part([person(), second, slow], {"sub-01": SOMEBODY}, "auto", cutoff=2.0, masses=masses)
     assert list(frames["trial"].unique()) == [TRIAL.trial, "second"]
     assert list(coverage["mass"][:2]) == [70.0, 70.0]
     assert "other trials" in coverage["notes"][1]
     assert "2 Hz at 2 frames" in coverage["limitation"][2]
     tables.write("signals", frames, tmp_path / "s.parquet")
     tables.write("coverage", coverage, tmp_path / "c.parquet")
-    nothing, row = of_part([slow], {}, "auto", cutoff=2.0)
+    nothing, row = of_part([slow], {}, "auto", cutoff=2.0, masses={})
     tables.write("signals", nothing, tmp_path / "s.parquet")
     assert len(row) == 1
 

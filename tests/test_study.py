@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from plumbline.config import with_defaults
 from plumbline.errors import REASONS, PlumblineError
 from plumbline.study import Trial, assign, check_names, entities, find
 
@@ -96,9 +97,10 @@ def test_inserting_a_subject_changes_one_part(numbers: set[int], new: int, size:
     assert max(len(who) for who in content(after).values()) <= size
 
 
-def test_a_cohort_is_hundreds_of_parts() -> None:
-    """1,000 subjects at the default of 8 are 125 parts: with five stages and a figure job, 750 jobs."""
-    assert len(set(assign([f"sub-{i:04d}" for i in range(1000)], 8).values())) == 125
+def test_a_cohort_is_hundreds_of_jobs() -> None:
+    """1,000 subjects at the default size: 63 parts, with five stages and four figures each 567 jobs and the cohort's few."""
+    size = with_defaults({})["subjects_per_job"]
+    assert 9 * len(set(assign([f"sub-{i:04d}" for i in range(1000)], size).values())) < 1000
 
 
 def test_names_in_the_config_are_known(tmp_path: Path) -> None:
