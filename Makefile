@@ -12,7 +12,7 @@ setup: ## make .venv from the hash-pinned locks
 	@$(PYTHON) -m plumbline setup
 
 run: ## run the demo study, or another: make run STUDY=FOLDER
-	@$(PYTHON) -m plumbline run $(STUDY)
+	@$(PYTHON) -m plumbline run $(if $(STUDY),"$(STUDY)")
 
 test: ## run the tests
 	@$(PYTHON) -m plumbline test
@@ -30,7 +30,7 @@ discovery: setup ## hidden-effect studies
 	@echo "make discovery: nothing yet; it comes with the search for missing effects"
 
 data: setup ## link public data into studies/: make data DATA=FOLDER
-	@.venv/bin/plumbline data $(DATA)
+	@.venv/bin/plumbline data "$(DATA)"
 
 lock: setup ## renew the locks from requirements.in
 	.venv/bin/uv pip compile -q --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header \

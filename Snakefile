@@ -23,3 +23,4 @@ rule all:
         "results/verdict.json",
         "results/ladder.parquet",
         "results/exclusions.parquet",
+        rules.csv_tables.output if config["csv"] else [],

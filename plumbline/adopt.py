@@ -59,11 +59,19 @@ def adopt(folder: Path, pattern: str, *, task: str = "", force: bool = False) ->
             left.append(name)
     if not rows:
         raise PlumblineError(f"no file below {study.raw} fits '{pattern}'; the first is '{names[0] if names else 'none'}'")
+    alike = [row for row in rows if sum(row[1:] == other[1:] and _ending(row) == _ending(other) for other in rows) > 1]
+    if alike:
+        both = ", ".join(row[0] for row in alike[:4])
+        raise PlumblineError(f"pattern '{pattern}': {both} would be one trial; tell them apart with {{run}}, {{acq}} or {{session}}")
     target = folder / "recordings.tsv"
     lines = ["\t".join(["file", *FIELDS.values()]), *("\t".join(row) for row in rows)]
     target.write_text("\n".join(lines) + "\n", encoding="utf-8")
     yield f"{target}: {len(rows)} files"
     yield from (f"not taken (does not fit the pattern): {name}" for name in left)
+
+
+def _ending(row: list[str]) -> str:
+    return Path(row[0]).suffix.lower()
 
 
 def _clean(value: str) -> str:

@@ -9,6 +9,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from plumbline.study import recordings  # standard library only, as this file
+
 REPO = Path(__file__).resolve().parents[1]
 VENV = REPO / ".venv"
 BIN = VENV / ("Scripts" if os.name == "nt" else "bin")
@@ -80,13 +82,15 @@ def run(arguments: list[str]) -> int:
     if not study.is_dir():
         print(f"{study}: no such folder; give the study's folder, e.g. make run STUDY=studies/pds", file=sys.stderr)
         return 2
-    demo = study == REPO and not _recordings(REPO / "raw")
+    demo = study == REPO and not any(recordings(REPO / "raw"))
     if demo and (code := _call("plumbline", "demo", str(REPO / "raw"))):
         return code
     if not any(o.startswith(("-c", "-j", "--cores", "--jobs")) for o in options):
         options = [f"--cores={os.cpu_count() or 1}", *options]
     base = ["-s", str(REPO / "Snakefile"), "-d", str(study)]
-    if code := _call("snakemake", *base, *options):
+    if code := _call("snakemake", *base, "--rerun-incomplete", *options):
+        if (study / ".snakemake" / "locks").is_dir() and any((study / ".snakemake" / "locks").iterdir()):
+            print(f"If no other run is at work here, free the folder with: {BIN / 'snakemake'} {' '.join(base)} --unlock", file=sys.stderr)
         return code
     page, archive = study / "results" / "report.html", study / "results" / "report.zip"
     if page.is_file() and not (archive.is_file() and archive.stat().st_mtime >= page.stat().st_mtime):
@@ -119,10 +123,6 @@ def check(arguments: list[str]) -> int:
 def papers(arguments: list[str]) -> int:
     """Compare results with the committed references."""
     return run([]) or _call("plumbline", "papers")
-
-
-def _recordings(raw: Path) -> bool:
-    return raw.is_dir() and any(not f.name.startswith(".") for f in raw.iterdir())
 
 
 def _exe(name: str) -> str:

@@ -10,7 +10,7 @@ import pandas as pd
 from plumbline import markerset
 from plumbline.config import study_config
 from plumbline.recording import tables_of
-from plumbline.study import Study, find
+from plumbline.study import Study, check_comparison, find
 
 
 class Line(NamedTuple):
@@ -28,6 +28,7 @@ def lines(folder: Path) -> Iterator[Line]:
     """
     config = study_config(folder)
     study = find(folder, config["raw"])
+    check_comparison(study.trials, config["evaluation"]["train"], config["evaluation"]["test"])
     read = 0
     for trial in study.trials:
         trials, markers, _ = tables_of(

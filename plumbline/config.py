@@ -10,6 +10,7 @@ import jsonschema
 
 from plumbline.errors import PlumblineError
 
+MARKER_SETS = Path(__file__).resolve().parent / "markersets"
 SCHEMAS = Path(__file__).resolve().parents[1] / "workflow" / "schemas"
 
 
@@ -28,10 +29,17 @@ def with_defaults(config: Mapping[str, Any] | None, source: str = "config.yaml")
     """
     schema = config_schema()
     filled = _fill(schema, dict(config or {}))
-    problems = list(_problems(schema, filled))
+    problems = list(_problems(schema, filled)) or list(_unknown_set(filled["markerset"]))
     if problems:
         raise PlumblineError(f"{source}: " + "; ".join(problems))
     return filled
+
+
+def _unknown_set(wanted: str) -> Iterator[str]:
+    known = sorted(f.stem for f in MARKER_SETS.glob("*.yaml"))
+    if wanted not in ("auto", *known):
+        near = get_close_matches(wanted, known, n=1)
+        yield f"markerset '{wanted}': " + (f"did you mean '{near[0]}'?" if near else f"built in: {', '.join(known)}")
 
 
 def _fill(schema: Mapping[str, Any], given: dict[str, Any]) -> dict[str, Any]:
@@ -39,8 +47,8 @@ def _fill(schema: Mapping[str, Any], given: dict[str, Any]) -> dict[str, Any]:
     for key, sub in schema.get("properties", {}).items():
         if key not in out and "default" in sub:
             out[key] = sub["default"]
-        if sub.get("type") == "object" and out.get(key) is None and key in given:
-            out[key] = {}  # a section whose lines are all commented out
+        if out.get(key) is None and key in given and "default" in sub:
+            out[key] = sub["default"]  # a key without a value, or a section whose lines are all commented out
         if isinstance(out.get(key), dict) and sub.get("type") == "object":
             out[key] = _fill(sub, out[key])
     return out

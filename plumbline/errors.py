@@ -20,6 +20,7 @@ REASONS = {
     "no_unit": "a unit is missing or unknown",
     "no_column": "a column that the config names is not in the file",
     "no_data": "the file holds neither markers, nor a CoM, nor forces",
+    "duplicate": "two files of one trial hold the same kind of data: they are two trials",
     "no_plates": "the recording has no force plate",
     "unloaded": "nobody stands on the plates",
     "stuck_channel": "a channel of a loaded plate does not move",

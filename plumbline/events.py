@@ -3,6 +3,7 @@
 import csv
 import math
 from collections.abc import Iterable, Mapping
+from difflib import get_close_matches
 from pathlib import Path
 
 from plumbline.errors import Refused
@@ -53,7 +54,11 @@ def _event(row: Mapping[str, str], file: str, line: int, start: float) -> Event:
             f"{file}, line {line}: onset {values[0]:g}, duration {values[1]:g}",
             "give finite seconds; a duration is not negative",
         )
-    return start + values[0], values[1], (row.get("trial_type") or "").strip()
+    kind = (row.get("trial_type") or "").strip()
+    near = get_close_matches(kind.lower(), EVENT_TYPES, n=1)
+    if near and kind not in EVENT_TYPES:
+        raise Refused("bad_events", f"{file}, line {line}: trial_type '{kind}'", f"did you mean '{near[0]}'?")
+    return start + values[0], values[1], kind
 
 
 def _note_events(events: Iterable[Event], start: float, end: float, notes: list[str]) -> None:

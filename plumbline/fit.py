@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 from plumbline.models.com_zmp import Noise, PlantFit, fit, free_run, zmp_error
 from plumbline.physics import G
-from plumbline.plant import AXES, Plant, of_trials
+from plumbline.plant import AXES, Plant, of_trials, sampling_rate
 from plumbline.study import names
+from plumbline.tables import TABLES
+from plumbline.weak import SAMPLES
 
 Array = NDArray[np.float64]
 
@@ -58,6 +60,7 @@ def identify(
             mine = [w for w in everything if w.subject == subject and w.axis == axis]
             fits += list(_fits(mine))
             heldout += list(judge(mine, evaluation))
+    fits += list(_left_out(signals, coverage, everything, evaluation))
     return pd.DataFrame(fits), pd.DataFrame(heldout)
 
 
@@ -100,6 +103,23 @@ def _fits(mine: Sequence[Windows]) -> Iterator[dict[str, Any]]:
         chosen = [(w, w.picked) for w in mine if (w.task, w.condition) == (task, condition)]
         yield from _row(chosen, "condition", {"task": task, "condition": condition, "trial": "", "locus": 0})
     yield from _row([(w, w.picked) for w in mine], "subject", {"task": "", "condition": "", "trial": "", "locus": 0})
+
+
+def _left_out(
+    signals: pd.DataFrame, coverage: pd.DataFrame, everything: Sequence[Windows], evaluation: Mapping[str, Any]
+) -> Iterator[dict[str, Any]]:
+    """Rows of `fit` without an estimate, for trials with a CoM that hold no test function, with the reason."""
+    blank = {c.name: {"str": "", "int": 0, "float": float("nan")}[c.kind] for c in TABLES["fit"]}
+    seen = {(w.trial, w.axis) for w in everything}
+    for _, about in coverage[coverage["com_method"] != "none"].iterrows():
+        rate = sampling_rate(signals.loc[signals["trial"] == about["trial"], "time"].to_numpy())
+        said = f"no test function of half width {evaluation['half_width']:g} s fits between its gaps, pushes and ends"
+        if evaluation["half_width"] * rate < SAMPLES:
+            said = f"{rate:.3g} Hz is too slow for a half width of {evaluation['half_width']:g} s"
+        key = {k: about[k] for k in ("subject", "task", "condition", "trial")}
+        for axis in AXES:
+            if (about["trial"], axis) not in seen:
+                yield blank | key | {"axis": axis, "level": "trial", "warning": f"{about['trial']}: {said}"}
 
 
 def _row(chosen: Sequence[tuple[Windows, NDArray[np.int64]]], level: str, about: dict[str, Any]) -> Iterator[dict[str, Any]]:

@@ -20,6 +20,14 @@ def merge(parts: list[Raw]) -> Raw:
     they coincide within half a frame. A label that is there already is left out with a note. Plates of all files are kept.
     Raises Refused(bad_time) where two files share no time.
     """
+    held = {"markers": [bool(p.labels) for p in parts], "force plates": [bool(p.plates) for p in parts]}
+    for what, holds in held.items():
+        if sum(holds) > 1:
+            raise Refused(
+                "duplicate",
+                f"{len(parts)} files of one trial, and more than one of them holds {what}",
+                "give each trial its own run: in its name, in recordings.tsv, or with {run} in the pattern of `plumbline adopt`",
+            )
     base = next((p for p in parts if p.time.size), parts[0])
     out = replace(base, labels=list(base.labels), derived=dict(base.derived), channels=dict(base.channels), plates=[], notes=[])
     for part in parts:

@@ -7,8 +7,6 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-import pandas as pd
-
 from plumbline import __version__
 from plumbline.tables import Stamp
 
@@ -30,15 +28,3 @@ def start(snakemake: Any) -> Stamp:
 
     sys.excepthook = keep
     return Stamp(params.code, params.config)
-
-
-def say(snakemake: Any, lines: list[str]) -> None:
-    """Add lines to the job's log."""
-    with Path(snakemake.log[0]).open("a", encoding="utf-8") as handle:
-        handle.writelines(f"{line}\n" for line in lines)
-
-
-def csv(frame: pd.DataFrame, path: str, wanted: bool) -> None:
-    """Write a .csv beside a cohort table where the config asks for it."""
-    if wanted:
-        frame.to_csv(Path(path).with_suffix(".csv"), index=False)

@@ -18,6 +18,10 @@ SEED = 20130101  # the intervals are the same at each run
 NOT_BUILT = "not judged yet: this version measures the paper's equation and does not search for missing effects"
 
 
+NOTHING = {"kind": "weak"} | dict.fromkeys(("error_mm", "ci_low_mm", "ci_high_mm", "noise_floor_mm"), float("nan"))
+"""The base rung where no trial could be judged."""
+
+
 def ladder(heldout: pd.DataFrame) -> pd.DataFrame:
     """Table `ladder`: the base rung, pooled and per task, subject and condition, weak and free-run.
 
@@ -28,7 +32,7 @@ def ladder(heldout: pd.DataFrame) -> pd.DataFrame:
         mine = heldout[heldout["axis"] == axis]
         for task, subject, condition, group in _groups(mine):
             key = {"axis": axis, "task": task, "subject": subject, "condition": condition}
-            rows += [{"ledger": "plant", **key, "model": "base", "effects": "", **r} for r in rungs(group)]
+            rows += [{"ledger": "plant", **key, "model": "base", "effects": "", **r} for r in rungs(group) or [NOTHING]]
     return pd.DataFrame(rows, columns=[c.name for c in TABLES["ladder"]])
 
 
@@ -42,20 +46,18 @@ def _groups(table: pd.DataFrame) -> Iterator[tuple[str, str, str, pd.DataFrame]]
         yield "all", "all", str(condition), group
 
 
-def rungs(group: pd.DataFrame) -> Iterator[dict[str, Any]]:
+def rungs(group: pd.DataFrame) -> list[dict[str, Any]]:
     """Error, interval and floor of one group of trials, weak and free-run; nothing for an empty group."""
     if group.empty:
-        return
+        return []
     square, count = group["square_sum"].to_numpy(), group["windows"].to_numpy(float)
     noise = group["noise_variance"].to_numpy()
-    yield {
-        "kind": "weak",
-        **error_mm(square, count),
-        "noise_floor_mm": 1e3 * float(np.sqrt(np.average(noise, weights=count))),
-    }
+    floor = 1e3 * float(np.sqrt(np.average(noise, weights=count)))
+    out = [{"kind": "weak", **error_mm(square, count), "noise_floor_mm": floor}]
     square, count = group["free_run_square_sum"].to_numpy(), group["free_run_frames"].to_numpy(float)
     if count.sum():
-        yield {"kind": "free_run", **error_mm(square, count), "noise_floor_mm": float("nan")}
+        out.append({"kind": "free_run", **error_mm(square, count), "noise_floor_mm": float("nan")})
+    return out
 
 
 def error_mm(square: Array, count: Array) -> dict[str, float]:
@@ -96,8 +98,8 @@ def _blocks(table: pd.DataFrame, axis: str, subject: str, coverage: pd.DataFrame
         (table["ledger"] == "plant") & (table["kind"] == "weak") & (table["model"] == "base") & (table["axis"] == axis)
         & (table["subject"] == subject) & (table["task"] == "all") & (table["condition"] == "all")
     ]  # fmt: skip
-    base = float(chosen["error_mm"].iloc[0]) if len(chosen) else None
-    floor = float(chosen["noise_floor_mm"].iloc[0]) if len(chosen) else None
+    base = float(chosen["error_mm"].iloc[0]) if len(chosen) and chosen["error_mm"].notna().all() else None
+    floor = float(chosen["noise_floor_mm"].iloc[0]) if base is not None else None
     return {
         "plant": _block(base, floor if floor == floor else None, _reason(base, floor, coverage)),
         "control": _block(None, None, "not judged yet: the controller is not identified in this version"),
@@ -114,9 +116,15 @@ def _block(base: float | None, floor: float | None, reason: str) -> dict[str, An
 def _reason(base: float | None, floor: float | None, coverage: pd.DataFrame) -> str:
     if base is None:
         return f"no held-out error: {_why_no_error(coverage)}"
+    said = NOT_BUILT
+    methods = coverage.loc[coverage["com_method"] != "none", "com_method"]
+    if 0 < (methods == "force").sum() < len(methods):
+        said += (
+            f"; in {(methods == 'force').sum()} of {len(methods)} trials the CoM was integrated from the force and follows it by assumption"
+        )
     if floor != floor:
-        return f"{NOT_BUILT}; the noise floor is not identifiable: {_why_no_floor(coverage)}"
-    return NOT_BUILT
+        said += f"; the noise floor is not identifiable: {_why_no_floor(coverage)}"
+    return said
 
 
 def _why_no_error(coverage: pd.DataFrame) -> str:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from plumbline.models.com_zmp import Noise
 from plumbline.physics import G
-from plumbline.weak import Bump, white_noise_sd
+from plumbline.weak import SAMPLES, Bump, white_noise_sd
 
 Array = NDArray[np.float64]
 
@@ -166,7 +166,10 @@ def of_trials(
         if index is None or about["com_method"] == "none":
             continue
         frames = signals.iloc[index]
-        bump = Bump(half_width, exponent, sampling_rate(frames["time"].to_numpy()))
+        rate = sampling_rate(frames["time"].to_numpy())
+        if not half_width * rate >= SAMPLES:
+            continue
+        bump = Bump(half_width, exponent, rate)
         pushed = by_trial.get(about["trial"], pushes.iloc[:0])
         known = not about["filtered_before"] and about["com_method"] != "force"
         plants = {a: plant(frames, pushed, about["mass"], a, bump, known) for a in AXES}

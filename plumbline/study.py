@@ -6,7 +6,7 @@ Imports no numpy or pandas: the Snakefile calls it at each start.
 import csv
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -14,31 +14,19 @@ from typing import Any
 
 from plumbline.errors import PlumblineError
 
-SIDE_NAMES = (
-    "participants.",
-    "recordings.tsv",
-    "markerset.yaml",
-    "readme",
-    "license",
-    "licence",
-    "changes",
-    "dataset_description",
-)
-SIDE_ENDINGS = (
-    "_events.tsv",
-    "_events.json",
-    ".md",
-    ".xml",
-    ".json",
-    ".yaml",
-    ".yml",
-    ".html",
-    ".pdf",
-    ".png",
-    ".jpg",
-    ".py",
+SIDE_NAME = re.compile(
+    r"(participants\.(tsv|json)|recordings\.tsv|markerset\.yaml|(readme|licen[sc]e|changes)(\.[\w.-]+)?|.*_events\.(tsv|json)"
+    r"|.*\.(md|xml|json|ya?ml|html|pdf|png|jpe?g))",
+    re.IGNORECASE,
 )
 """Files that describe; every other file below raw/ is read or named in the exclusions, never passed over."""
+
+MISNAMED = {
+    "mass_kg": ("mass", "weight", "weight_kg", "bodymass", "body_mass"),
+    "height_m": ("height", "height_cm", "stature", "body_height"),
+    "sex": ("gender",),
+}
+"""Columns of participants.tsv by names that other labs give them: their units are not known, so they are not taken."""
 
 ENTITIES = ("sub", "ses", "task", "acq", "run")
 
@@ -92,6 +80,7 @@ def check_names(trials: Iterable[Trial], wanted: Mapping[str, Iterable[str]]) ->
 
     wanted: key of the config -> the names given there.
     """
+    trials = list(trials)
     known = sorted({n for t in trials for n in names(t.trial, t.task, t.files)})
     for key, given in wanted.items():
         for name in given:
@@ -99,6 +88,17 @@ def check_names(trials: Iterable[Trial], wanted: Mapping[str, Iterable[str]]) ->
                 near = get_close_matches(name, known, n=1)
                 advice = f"did you mean '{near[0]}'?" if near else f"tasks here: {', '.join(sorted({t.task for t in trials}))}"
                 raise PlumblineError(f"{key}: no trial, task or file is called '{name}'; {advice}")
+
+
+def check_comparison(trials: Iterable[Trial], train: Sequence[str], test: Sequence[str]) -> None:
+    """Raise PlumblineError for a comparison that cannot be made: unknown names, nothing to test on, nothing left to train on."""
+    trials = list(trials)
+    check_names(trials, {"evaluation.train": train, "evaluation.test": test})
+    if train and not test:
+        raise PlumblineError("evaluation.train needs evaluation.test: what should be judged?")
+    called = [names(t.trial, t.task, t.files) for t in trials]
+    if test and not any((not train or n & set(train)) and not n & set(test) for n in called):
+        raise PlumblineError("evaluation: every trial of train is in test too (a trial on both sides is tested only): nothing to fit on")
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ def find(folder: Path, raw: str = "raw") -> Study:
     base = folder / raw
     if not base.is_dir():
         raise PlumblineError(f"{base}: no such folder; put the recordings there or set `raw:` in config.yaml")
-    found = sorted(_recordings(base))
+    found = sorted(recordings(base))
     table = side_file(folder, base, "recordings.tsv")
     trials, exclusions = _listed(base, found, table) if table else _named(base, found)
     people = _participants(side_file(folder, base, "participants.tsv"))
@@ -157,22 +157,25 @@ def side_file(folder: Path, raw: Path, name: str) -> Path | None:
     return next((f for f in (folder / name, raw / name) if f.is_file()), None)
 
 
-def _recordings(raw: Path) -> Iterator[Path]:
+def recordings(raw: Path) -> Iterator[Path]:
     """Files below raw/ that are no side files; links are followed, hidden files and folders are not."""
-    for where, folders, names in os.walk(raw, followlinks=True):
-        folders[:] = sorted(f for f in folders if not f.startswith("."))
-        for name in names:
-            low = name.lower()
-            if not low.startswith((".", *SIDE_NAMES)) and not low.endswith(SIDE_ENDINGS):
-                yield Path(where) / name
+    seen = {os.path.realpath(raw)}
+    for where, folders, files in os.walk(raw, followlinks=True):
+        inside = {f: os.path.realpath(os.path.join(where, f)) for f in sorted(folders) if not f.startswith(".")}
+        folders[:] = [f for f, real in inside.items() if real not in seen]  # a link back up would never end
+        seen |= set(inside.values())
+        yield from (Path(where) / f for f in files if not f.startswith(".") and not SIDE_NAME.fullmatch(f))
 
 
 # -- names ------------------------------------------------------------------------------------------------------------
 
 
 def entities(stem: str) -> dict[str, str] | None:
-    """BIDS entities of a file name without ending, or None where it follows no such pattern."""
-    pairs = [part.split("-", 1) for part in stem.split("_")]
+    """BIDS entities of a file name without ending, or None where it follows no such pattern; a suffix such as `_grf` may follow."""
+    parts = stem.split("_")
+    if len(parts) > 2 and parts[-1].isalpha():
+        parts.pop()
+    pairs = [part.split("-", 1) for part in parts]
     if any(len(p) != 2 or not p[1] for p in pairs):
         return None
     got = {k: v for k, v in pairs}
@@ -222,6 +225,11 @@ def _listed(raw: Path, found: list[Path], table: Path) -> tuple[list[Trial], lis
     pairs, exclusions, used = [], [], set()
     for line, row in _rows(table, required=("file", "participant_id", "task")):
         file = raw / row["file"]
+        for column in ("file", "participant_id", "task"):
+            if not row[column]:
+                raise PlumblineError(f"{table}: line {line}: column {column} is empty")
+        if file in used:
+            raise PlumblineError(f"{table}: line {line}: {row['file']} stands there twice")
         used.add(file)
         if not file.is_file():
             exclusions.append(
@@ -237,7 +245,7 @@ def _listed(raw: Path, found: list[Path], table: Path) -> tuple[list[Trial], lis
             str(f.relative_to(raw)),
             "not_listed",
             f"{table.name} does not list {f.name}",
-            f"add a line for it to {table.name}",
+            f"if it is a recording, add a line for it to {table.name}",
         )
         for f in found
         if f not in used
@@ -281,6 +289,10 @@ def _participants(table: Path | None) -> dict[str, Participant]:
         return {}
     people: dict[str, Participant] = {}
     for line, row in _rows(table, required=("participant_id",)):
+        for column, others in MISNAMED.items():
+            wrong = next((c for c in row if column not in row and c.lower() in others), None)
+            if wrong:
+                raise PlumblineError(f"{table}: column '{wrong}': did you mean '{column}'?")
         subject = with_sub(row["participant_id"])
         if subject in people:
             raise PlumblineError(f"{table}: line {line}: {subject} stands there twice")
@@ -346,6 +358,15 @@ def read_parts(path: Path, size: int) -> dict[str, str]:
         return {}
     rows = [r for _, r in _rows(path, required=("subject", "part", "subjects_per_job"))]
     return {r["subject"]: r["part"] for r in rows if r["subjects_per_job"] == str(size)}
+
+
+def forget_parts(parts: Iterable[str], results: Path) -> list[Path]:
+    """Remove tables and figures of parts that are no more, so that a folder stays one whole table; returns what was removed."""
+    now = set(parts)
+    old = [f for f in results.glob("*/*part-[0-9][0-9][0-9][0-9].*") if f.stem.removeprefix("_") not in now]
+    for file in old:
+        file.unlink()
+    return old
 
 
 def write_parts(parts: Mapping[str, str], size: int, path: Path) -> None:

@@ -165,7 +165,7 @@ TABLES: dict[str, list[Column]] = {
     "fit": [
         _c("subject", "str", "", "participant_id, with sub-"),
         _c("axis", "str", "", "lateral or forward"),
-        _c("level", "str", "", "what was fitted together: locus, condition or subject"),
+        _c("level", "str", "", "what was fitted together: locus, condition or subject; trial: left out, see warning"),
         _c("task", "str", "", "task of the locus; empty where pooled"),
         _c("condition", "str", "", "condition; empty where pooled or where none"),
         _c("trial", "str", "", "trial of the locus; empty where pooled"),
@@ -338,6 +338,13 @@ def read_all(name: str, paths: Iterable[str | Path], columns: list[str] | None =
     table = pd.concat(frames, ignore_index=True)
     by = [c for c in ("subject", "trial") if c in table]
     return table.sort_values(by, kind="stable", ignore_index=True) if by else table
+
+
+def to_csv(name: str, paths: Iterable[str | Path], target: str | Path) -> None:
+    """Write all parts of a table as one .csv, part by part."""
+    empty(name).to_csv(target, index=False)
+    for path in paths:
+        read(name, path).to_csv(target, index=False, mode="a", header=False)
 
 
 def about(path: str | Path) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+SAMPLES = 4  # on each side of the centre: fewer cannot carry a second derivative
 NORMAL = 0.6744897501960817  # median absolute value of a standard normal variable
 
 
@@ -33,8 +34,8 @@ class Bump:
     rate: float
 
     def __post_init__(self) -> None:
-        if self.reach < 4:
-            raise ValueError(f"half width {self.half_width} s holds only {self.reach} samples at {self.rate} Hz, needs 4")
+        if self.reach < SAMPLES:
+            raise ValueError(f"half width {self.half_width} s holds only {self.reach} samples at {self.rate} Hz, needs {SAMPLES}")
 
     @property
     def reach(self) -> int:

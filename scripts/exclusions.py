@@ -11,4 +11,3 @@ stamp = job.start(snakemake)
 unused = [Exclusion(*row) for row in snakemake.params.unused]
 table = exclusions(tables.read_all("trials", snakemake.input), unused)
 tables.write("exclusions", table, snakemake.output[0], stamp)
-job.csv(table, snakemake.output[0], snakemake.params.csv)

@@ -12,6 +12,5 @@ snakemake: Snakemake
 stamp = job.start(snakemake)
 table = ladder(tables.read_all("heldout", snakemake.input.heldout))
 tables.write("ladder", table, snakemake.output.ladder, stamp)
-job.csv(table, snakemake.output.ladder, snakemake.params.csv)
 said = verdict(table, snakemake.params.config, tables.read_all("coverage", snakemake.input.coverage))
 Path(snakemake.output.verdict).write_text(json.dumps(said, indent=1, allow_nan=False) + "\n", encoding="utf-8")

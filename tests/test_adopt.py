@@ -50,3 +50,12 @@ def test_patterns_that_cannot_work(tmp_path: Path, pattern: str, said: str) -> N
 def test_a_field_takes_no_underscore() -> None:
     """`a_b_1.c3d` is not silently cut in two somewhere."""
     assert expression("{participant}_{run}.c3d").match("a_b_1.c3d") is None
+
+
+def test_names_that_would_fuse_two_recordings_stop(tmp_path: Path) -> None:
+    """Two C3D files may not become one trial."""
+    (tmp_path / "raw").mkdir()
+    for name in ("ab_fast.c3d", "ab_slow.c3d"):
+        (tmp_path / "raw" / name).write_text("x")
+    with pytest.raises(PlumblineError, match=r"ab_fast.c3d, ab_slow.c3d would be one trial; tell them apart with \{run\}"):
+        list(adopt(tmp_path, "{participant}_*.c3d", task="gait"))

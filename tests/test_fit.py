@@ -149,3 +149,16 @@ def test_choices_of_the_comparison(w2: str, offset: str) -> None:
         assert mine["w2"].unique() == pytest.approx([9.81])
     else:
         assert np.sqrt(mine["square_sum"].sum() / mine["windows"].sum()) < 1e-4
+
+
+def test_a_trial_too_slow_for_the_test_function_is_named() -> None:
+    """At 8 Hz no bump of 0.4 s fits: the trial has a row that says so, and the others are fitted as before."""
+    signals, pushes, rows, coverage = study(loci(4, omega=2.74, k1=4.038, k2=0.875, seed=8))
+    slow = coverage["trial"].iloc[0]
+    thin = signals[(signals["trial"] != slow) | (signals["frame"] % 25 == 0)]
+    fits, heldout = identify(thin, pushes, rows.iloc[1:], coverage, EVALUATION)
+    said = fits[fits["level"] == "trial"]
+    assert set(said["trial"]) == {slow}
+    assert said["warning"].str.contains("8 Hz is too slow").all()
+    assert slow not in set(heldout["trial"])
+    assert len(heldout[heldout["axis"] == "lateral"]) == 3

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from plumbline.config import with_defaults
 from plumbline.errors import REASONS, PlumblineError
-from plumbline.study import Trial, assign, check_names, entities, find
+from plumbline.study import Trial, assign, check_comparison, check_names, entities, find, forget_parts
 
 
 def touch(*files: Path) -> None:
@@ -64,6 +64,7 @@ def test_recordings_table_names_files(tmp_path: Path) -> None:
         ("participant_id\tmass_kg\n1\t70000\n", "is the unit right"),
         ("participant_id\tmass_kg\n1\tseventy\n", "line 2, column mass_kg"),
         ("participant_id\tsex\n1\tQ\n", "column sex"),
+        ("participant_id\tmass\n1\t70\n", "did you mean 'mass_kg'"),
         ("participant_id\tsex\n1\tF\nsub-1\tF\n", "twice"),
     ],
 )
@@ -117,3 +118,54 @@ def test_every_reason_code_is_in_the_docs() -> None:
     """The table of reasons in docs/own-data.md is the closed list."""
     text = (Path(__file__).resolve().parents[1] / "docs" / "own-data.md").read_text()
     assert [line.split("`")[1] for line in text.splitlines() if line.startswith("| `") and line.split("`")[1] in REASONS] == list(REASONS)
+
+
+def test_comparisons_that_cannot_be_made_stop(tmp_path: Path) -> None:
+    """train without test, or everything on both sides: said before anything is read."""
+    touch(tmp_path / "raw" / "sub-1_task-a.c3d", tmp_path / "raw" / "sub-1_task-b.c3d")
+    trials = find(tmp_path).trials
+    check_comparison(trials, ["a"], ["b"])
+    check_comparison(trials, [], ["b"])
+    with pytest.raises(PlumblineError, match=r"needs evaluation\.test"):
+        check_comparison(trials, ["a"], [])
+    with pytest.raises(PlumblineError, match="nothing to fit on"):
+        check_comparison(trials, ["a"], ["a", "b"])
+
+
+def test_companions_with_a_suffix_and_names_that_look_like_side_files(tmp_path: Path) -> None:
+    """`_grf.mot` belongs to its .trc; `changes_gait_01.c3d` and a script are named, README and events are not."""
+    raw = tmp_path / "raw"
+    touch(raw / "sub-1_task-sq_run-01.trc", raw / "sub-1_task-sq_run-01_grf.mot", raw / "changes_gait_01.c3d", raw / "make.py")
+    touch(raw / "README.txt", raw / "sub-1_task-sq_run-01_events.tsv", raw / "LICENSE")
+    study = find(tmp_path)
+    assert [len(t.files) for t in study.trials] == [2]
+    assert {e.file for e in study.exclusions} == {"changes_gait_01.c3d", "make.py"}
+
+
+def test_a_link_back_up_ends(tmp_path: Path) -> None:
+    """raw/loop -> raw: every file once."""
+    touch(tmp_path / "raw" / "sub-1_task-a.c3d")
+    (tmp_path / "raw" / "loop").symlink_to(tmp_path / "raw", target_is_directory=True)
+    study = find(tmp_path)
+    assert [len(t.files) for t in study.trials] == [1]
+    assert study.exclusions == ()
+
+
+@pytest.mark.parametrize(
+    ("row", "said"),
+    [("a.c3d\t\tq", "participant_id is empty"), ("a.c3d\t1\t", "task is empty"), ("a.c3d\t1\tq\na.c3d\t2\tq", "twice")],
+)
+def test_recordings_table_with_holes_stops(tmp_path: Path, row: str, said: str) -> None:
+    """An empty id, an empty task, a file for two people: the line is named."""
+    touch(tmp_path / "raw" / "a.c3d")
+    (tmp_path / "recordings.tsv").write_text(f"file\tparticipant_id\ttask\n{row}\n")
+    with pytest.raises(PlumblineError, match=said):
+        find(tmp_path)
+
+
+def test_parts_that_are_no_more_are_forgotten(tmp_path: Path) -> None:
+    """Tables and figures of old parts go, so that a folder is one whole table; cohort files stay."""
+    touch(*(tmp_path / f for f in ("loci/part-0001.parquet", "loci/part-0002.parquet", "loci/_part-0002.svg", "where/_all.svg")))
+    gone = forget_parts(["part-0001"], tmp_path)
+    assert sorted(f.name for f in gone) == ["_part-0002.svg", "part-0002.parquet"]
+    assert (tmp_path / "where" / "_all.svg").exists()

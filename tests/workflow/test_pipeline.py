@@ -85,12 +85,12 @@ def test_a_second_run_does_nothing(small: Path) -> None:
 
 
 def test_an_unrelated_key_reruns_nothing_and_a_related_one_what_depends_on_it(small: Path) -> None:
-    """`models` is read by nothing yet; the half width reaches fit and what follows, never the recordings."""
+    """Asking for .csv files writes them and no more; the half width reaches fit and what follows, never the recordings."""
     config = small / "config.yaml"
     before = config.read_text()
     try:
-        config.write_text(before + "markerset: auto\nmodels: {mine: []}\n")
-        assert jobs(small) == {}
+        config.write_text(before + "markerset: auto\ncsv: true\n")
+        assert jobs(small) == {"csv_tables": 1}
         config.write_text(before + "evaluation: {half_width: 0.35}\n")
         ran = set(jobs(small))
         assert {"fit", "residuals", "ladder"} <= ran

@@ -29,8 +29,7 @@ try:
             f"{STUDY.raw}/ of {Path.cwd()} holds no recording: put files there as the README shows, "
             "or type `make run` in the repository, which makes the demo's"
         )
-    asked = {f"evaluation.{key}": config["evaluation"][key] for key in ("train", "test")}
-    studies.check_names(STUDY.trials, asked)
+    studies.check_comparison(STUDY.trials, config["evaluation"]["train"], config["evaluation"]["test"])
 except PlumblineError as error:
     raise WorkflowError(str(error)) from None
 
@@ -39,12 +38,16 @@ PART_OF = studies.assign(STUDY.subjects, SIZE, studies.read_parts(Path("results/
 PARTS = sorted(set(PART_OF.values()))
 
 
+PART_TABLES = ["trials", "markers", "plates", "signals", "coverage", "loci", "pushes", "fit", "heldout", "residuals", "where"]
+
+
 wildcard_constraints:
     part=r"part-\d{4}",
 
 
 onstart:
     studies.write_parts(PART_OF, SIZE, Path("results/parts.tsv"))
+    studies.forget_parts(PARTS, Path("results"))
 
 
 def trials(part):

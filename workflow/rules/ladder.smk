@@ -11,6 +11,5 @@ rule ladder:
     params:
         code=code("ladder.py"),
         config=config["evaluation"],
-        csv=config["csv"],
     script:
         "../../scripts/ladder.py"

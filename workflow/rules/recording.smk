@@ -32,6 +32,5 @@ rule exclusions:
         code=code("exclusions.py"),
         config={},
         unused=[list(vars(e).values()) for e in STUDY.exclusions],
-        csv=config["csv"],
     script:
         "../../scripts/exclusions.py"

@@ -33,3 +33,20 @@ rule report:
         parts=PARTS,
     script:
         "../../scripts/report.py"
+
+
+# Every table as text, where the config asks for it.
+rule csv_tables:
+    input:
+        **{t: parts(t) for t in PART_TABLES},
+        ladder="results/ladder.parquet",
+        exclusions="results/exclusions.parquet",
+    output:
+        expand("results/csv/{table}.csv", table=[*PART_TABLES, "ladder", "exclusions"]),
+    log:
+        "results/logs/csv_tables.log",
+    params:
+        code=code("csv_tables.py"),
+        config={},
+    script:
+        "../../scripts/csv_tables.py"
