@@ -16,7 +16,7 @@ KINDS = {"weak": "held-out error, as ZMP [mm]", "free_run": "free-run error of t
 @s.styled
 def draw(ladder: pd.DataFrame) -> Figure:
     """Columns: lateral and forward; a row of panels for the weak error and one for the free run.  ladder: the cohort's table."""
-    plant = ladder[ladder["ledger"] == "plant"]
+    plant = ladder[(ladder["ledger"] == "plant") & ladder["error_mm"].notna()]  # a base row without an error was not judged
     if plant.empty:
         return s.empty("The ladder", "no held-out error: no subject has two trials with a CoM and a ZMP")
     rows = layout(plant)
