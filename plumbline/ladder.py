@@ -76,12 +76,12 @@ def error_mm(square: Array, count: Array) -> dict[str, float]:
 # -- verdict ----------------------------------------------------------------------------------------------------------
 
 
-def verdict(table: pd.DataFrame, evaluation: Mapping[str, Any], coverage: pd.DataFrame) -> dict[str, Any]:
+def verdict(table: pd.DataFrame, evaluation: Mapping[str, Any], coverage: pd.DataFrame, heldout: pd.DataFrame) -> dict[str, Any]:
     """The interface `results/verdict.json`: the lateral axis pooled on top, then by axis and by subject.
 
-    table: the ladder.  coverage: says why a floor or an error is absent.
+    table: the ladder.  coverage: says why a floor or an error is absent.  heldout: which trials were judged.
     """
-    by_axis = {axis: _blocks(table, axis, "all", coverage) for axis in AXES}
+    by_axis = {axis: _blocks(table, axis, "all", coverage, heldout) for axis in AXES}
     subjects = sorted(coverage["subject"].unique())
     return {
         "schema_version": 1,
@@ -89,19 +89,20 @@ def verdict(table: pd.DataFrame, evaluation: Mapping[str, Any], coverage: pd.Dat
         "model": [],
         **by_axis["lateral"],
         "by_axis": by_axis,
-        "by_subject": {s: _blocks(table, "lateral", s, coverage[coverage["subject"] == s]) for s in subjects},
+        "by_subject": {s: _blocks(table, "lateral", s, coverage[coverage["subject"] == s], heldout) for s in subjects},
     }
 
 
-def _blocks(table: pd.DataFrame, axis: str, subject: str, coverage: pd.DataFrame) -> dict[str, Any]:
+def _blocks(table: pd.DataFrame, axis: str, subject: str, coverage: pd.DataFrame, heldout: pd.DataFrame) -> dict[str, Any]:
     chosen = table[
         (table["ledger"] == "plant") & (table["kind"] == "weak") & (table["model"] == "base") & (table["axis"] == axis)
         & (table["subject"] == subject) & (table["task"] == "all") & (table["condition"] == "all")
     ]  # fmt: skip
     base = float(chosen["error_mm"].iloc[0]) if len(chosen) and chosen["error_mm"].notna().all() else None
     floor = float(chosen["noise_floor_mm"].iloc[0]) if base is not None else None
+    judged = coverage["trial"].isin(heldout.loc[heldout["axis"] == axis, "trial"])
     return {
-        "plant": _block(base, floor if floor == floor else None, _reason(base, floor, coverage)),
+        "plant": _block(base, floor if floor == floor else None, _reason(base, floor, coverage, judged)),
         "control": _block(None, None, "not judged yet: the controller is not identified in this version"),
     }
 
@@ -113,17 +114,21 @@ def _block(base: float | None, floor: float | None, reason: str) -> dict[str, An
     }  # fmt: skip
 
 
-def _reason(base: float | None, floor: float | None, coverage: pd.DataFrame) -> str:
+def _reason(base: float | None, floor: float | None, coverage: pd.DataFrame, judged: "pd.Series[bool]") -> str:
+    """Why nothing more is said.  judged: the rows of `coverage` that a held-out error stands behind."""
     if base is None:
         return f"no held-out error: {_why_no_error(coverage)}"
     said = NOT_BUILT
-    methods = coverage.loc[coverage["com_method"] != "none", "com_method"]
+    able = (coverage["com_method"] != "none").sum()
+    if judged.sum() < able:
+        rest = "the others were not asked for, or no w2 could be found on the rest"
+        said += f"; {judged.sum()} of the {able} trials with a CoM were judged, {rest}"
+    methods = coverage.loc[judged, "com_method"]
     if 0 < (methods == "force").sum() < len(methods):
-        said += (
-            f"; in {(methods == 'force').sum()} of {len(methods)} trials the CoM was integrated from the force and follows it by assumption"
-        )
+        share = f"{(methods == 'force').sum()} of {len(methods)} judged trials"
+        said += f"; in {share} the CoM was integrated from the force and follows it by assumption"
     if floor != floor:
-        said += f"; the noise floor is not identifiable: {_why_no_floor(coverage)}"
+        said += f"; the noise floor is not identifiable: {_why_no_floor(coverage[judged])}"
     return said
 
 
@@ -138,7 +143,9 @@ def _why_no_error(coverage: pd.DataFrame) -> str:
     return "w2 cannot be told on this axis: the CoM hardly moves against the ZMP there"
 
 
-def _why_no_floor(coverage: pd.DataFrame) -> str:
-    if (coverage["com_method"] == "force").any():
-        return "the CoM was integrated from the force"
-    return "files were low-passed before they came to us"
+def _why_no_floor(judged: pd.DataFrame) -> str:
+    causes = {
+        "the CoM was integrated from the force": (judged["com_method"] == "force").sum(),
+        "files were low-passed before they came to us": ((judged["com_method"] != "force") & judged["filtered_before"]).sum(),
+    }
+    return "; ".join(f"in {n} of {len(judged)} judged trials {cause}" for cause, n in causes.items() if n)

@@ -231,9 +231,4 @@ def of_part(signals: pd.DataFrame, coverage: pd.DataFrame, trials: pd.DataFrame)
         found = pushes(frames, events[trial], masses[trial])
         pushed.append(found)
         loci.append(split(frames, found, events[trial]))
-    return _joined("loci", loci), _joined("pushes", pushed)
-
-
-def _joined(name: str, parts: Sequence[pd.DataFrame]) -> pd.DataFrame:
-    rows = [p for p in parts if len(p)]
-    return pd.concat(rows, ignore_index=True) if rows else tables.empty(name)
+    return tables.joined("loci", loci), tables.joined("pushes", pushed)

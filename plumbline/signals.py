@@ -23,7 +23,7 @@ from plumbline.errors import Refused
 from plumbline.forces import Forces, Plate
 from plumbline.markerset import MarkerSet, choose
 from plumbline.study import Participant, Trial
-from plumbline.tables import TABLES, empty
+from plumbline.tables import TABLES, joined
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -277,16 +277,12 @@ def of_part(
             continue
         frames.append(made.frames)
         rows.append(made.coverage | {"notes": json.dumps(made.notes, ensure_ascii=False)})
-    return _joined("signals", frames), _joined("coverage", [pd.DataFrame(rows)] if rows else [])
+    return joined("signals", frames), joined("coverage", [pd.DataFrame(rows)] if rows else [])
 
 
 def subject_masses(trials: pd.DataFrame) -> dict[str, float]:
     """Body mass of each subject [kg]: the median of what the plates say in its trials (columns `subject`, `mass`); NaN where none does."""
     return {str(s): float(m) for s, m in trials.groupby("subject")["mass"].median().items()}
-
-
-def _joined(name: str, parts: Sequence[pd.DataFrame]) -> pd.DataFrame:
-    return pd.concat(parts, ignore_index=True) if parts else empty(name)
 
 
 def _no_signals(trial: Trial, cutoff: float, refusal: Refused) -> dict[str, Any]:

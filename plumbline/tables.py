@@ -278,6 +278,12 @@ def empty(name: str) -> pd.DataFrame:
     return pd.DataFrame(schema(name).empty_table().to_pandas())
 
 
+def joined(name: str, parts: Iterable[pd.DataFrame]) -> pd.DataFrame:
+    """One table of several pieces; the table without rows where all are empty."""
+    rows = [p for p in parts if len(p)]
+    return pd.concat(rows, ignore_index=True) if rows else empty(name)
+
+
 NO_STAMP = Stamp()
 
 

@@ -10,7 +10,8 @@ from plumbline.ladder import ladder, verdict
 
 snakemake: Snakemake
 stamp = job.start(snakemake)
-table = ladder(tables.read_all("heldout", snakemake.input.heldout))
+heldout = tables.read_all("heldout", snakemake.input.heldout)
+table = ladder(heldout)
 tables.write("ladder", table, snakemake.output.ladder, stamp)
-said = verdict(table, snakemake.params.config, tables.read_all("coverage", snakemake.input.coverage))
+said = verdict(table, snakemake.params.config, tables.read_all("coverage", snakemake.input.coverage), heldout)
 Path(snakemake.output.verdict).write_text(json.dumps(said, indent=1, allow_nan=False) + "\n", encoding="utf-8")

@@ -43,7 +43,7 @@ def finish(out: dict[str, Any]) -> dict[str, Any]:
     out["residuals"], out["where"] = _typed("residuals", frames), _typed("where", where)
     out["ladder"] = _typed("ladder", ladder(out["heldout"]))
     out["exclusions"] = _typed("exclusions", exclusions(out["trials"], []))
-    out["verdict"] = verdict(out["ladder"], CONFIG["evaluation"], out["coverage"])
+    out["verdict"] = verdict(out["ladder"], CONFIG["evaluation"], out["coverage"], out["heldout"])
     return out
 
 

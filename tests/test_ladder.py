@@ -24,7 +24,7 @@ def heldout(n: int = 6, subjects: int = 2) -> pd.DataFrame:
 
 def coverage(**change: object) -> pd.DataFrame:
     row = {c.name: {"str": "", "float": 1.0, "int": 1, "bool": False}[c.kind] for c in tables.TABLES["coverage"]}
-    return pd.DataFrame([{**row, "subject": f"sub-{i}", "com_method": "table", **change} for i in range(2)])
+    return pd.DataFrame([{**row, "trial": f"t{i}", "subject": f"sub-{i}", "com_method": "table", **change} for i in range(2)])
 
 
 def test_errors_pool_as_rms() -> None:
@@ -47,7 +47,7 @@ def test_ladder_has_the_fixed_columns() -> None:
 
 def test_the_verdict_says_not_judged() -> None:
     """missing is null, never an empty list; by_axis and by_subject repeat the blocks; all numbers are finite or null."""
-    said = verdict(ladder(heldout()), with_defaults({})["evaluation"], coverage())
+    said = verdict(ladder(heldout()), with_defaults({})["evaluation"], coverage(), heldout())
     assert said["plant"]["missing"] is None
     assert said["plant"]["unexplained"] is None
     assert said["plant"]["final_error_mm"] is None
@@ -61,13 +61,25 @@ def test_the_verdict_says_not_judged() -> None:
 def test_an_unknown_floor_is_null_and_says_why() -> None:
     """Where a file was filtered before, the floor is not zero but unknown."""
     table = heldout().assign(noise_variance=float("nan"))
-    said = verdict(ladder(table), with_defaults({})["evaluation"], coverage(filtered_before=True))
+    said = verdict(ladder(table), with_defaults({})["evaluation"], coverage(filtered_before=True), table)
     assert said["plant"]["noise_floor_mm"] is None
     assert "low-passed before" in said["plant"]["reason"]
 
 
 def test_a_study_without_any_trial_has_a_verdict() -> None:
     """Everything excluded: nulls with a reason, not a crash."""
-    said = verdict(ladder(tables.empty("heldout")), with_defaults({})["evaluation"], tables.empty("coverage"))
+    said = verdict(ladder(tables.empty("heldout")), with_defaults({})["evaluation"], tables.empty("coverage"), tables.empty("heldout"))
     assert said["plant"]["base_error_mm"] is None
     assert "exclusions" in said["plant"]["reason"]
+
+
+def test_reasons_speak_of_the_judged_trials_only() -> None:
+    """A force-only trial that no error stands behind is not blamed for an unknown floor, and is counted as not judged."""
+    table = heldout().assign(noise_variance=float("nan"))
+    table = table[table["trial"] == "t0"]
+    known = coverage(filtered_before=True)
+    known.loc[1, "com_method"] = "force"
+    reason = verdict(ladder(table), with_defaults({})["evaluation"], known, table)["plant"]["reason"]
+    assert "1 of the 2 trials with a CoM were judged" in reason
+    assert "low-passed before" in reason
+    assert "integrated from the force" not in reason
