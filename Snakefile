@@ -9,11 +9,19 @@ include: "workflow/rules/common.smk"
 include: "workflow/rules/recording.smk"
 include: "workflow/rules/signals.smk"
 include: "workflow/rules/loci.smk"
+include: "workflow/rules/trust.smk"
+include: "workflow/rules/clusters.smk"
 include: "workflow/rules/fit.smk"
 include: "workflow/rules/residuals.smk"
 include: "workflow/rules/ladder.smk"
 include: "workflow/rules/figures.smk"
 include: "workflow/rules/report.smk"
+
+
+PAPER = []  # what a study's own rules add
+if Path("paper.smk").is_file():
+
+    include: Path.cwd() / "paper.smk"
 
 
 rule all:
@@ -23,4 +31,5 @@ rule all:
         "results/verdict.json",
         "results/ladder.parquet",
         "results/exclusions.parquet",
+        PAPER,
         rules.csv_tables.output if config["csv"] else [],

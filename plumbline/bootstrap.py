@@ -17,6 +17,7 @@ BIN = VENV / ("Scripts" if os.name == "nt" else "bin")
 COMMANDS = ("setup", "run", "test", "check", "papers")
 LOCKS = ("requirements-uv.lock", "requirements.lock", "pyproject.toml")
 LEAST = (3, 11)
+MAKER = "make_raw.py"  # of a simulated study: writes its raw/ where that is empty
 
 #: one BLAS thread per job and no clock: numbers and bytes must not depend on the machine's load
 ENVIRONMENT = {
@@ -75,15 +76,17 @@ def setup() -> int:
 
 
 def run(arguments: list[str]) -> int:
-    """`run [STUDY] [snakemake options]`: make the demo's recordings where needed, run, and zip the Snakemake report."""
+    """`run [STUDY] [snakemake options]`: make a simulated study's recordings where needed, run, and zip the Snakemake report."""
     named = bool(arguments) and not arguments[0].startswith("-")
     study = Path(arguments[0]).resolve() if named else REPO
     options = arguments[1:] if named else arguments
     if not study.is_dir():
         print(f"{study}: no such folder; give the study's folder, e.g. make run STUDY=studies/pds", file=sys.stderr)
         return 2
-    demo = study == REPO and not any(recordings(REPO / "raw"))
-    if demo and (code := _call("plumbline", "demo", str(REPO / "raw"))):
+    empty = not any(recordings(study / "raw"))
+    if empty and study == REPO and (code := _call("plumbline", "demo", str(REPO / "raw"))):
+        return code
+    if empty and (study / MAKER).is_file() and (code := _call("python", str(study / MAKER))):
         return code
     if not any(o.startswith(("-c", "-j", "--cores", "--jobs")) for o in options):
         options = [f"--cores={os.cpu_count() or 1}", *options]

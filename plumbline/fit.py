@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from plumbline.models.com_zmp import Noise, PlantFit, fit, free_run, zmp_error
+from plumbline.models.com_zmp import Noise, PlantFit, fit, free_motion, zmp_error
 from plumbline.physics import G
 from plumbline.plant import AXES, Plant, of_trials, sampling_rate
 from plumbline.study import names
@@ -237,5 +237,5 @@ def free_runs(plant: Plant, w2: float, offset: float = 0.0) -> Array:
     for piece in range(int(plant.cluster.max(initial=-1)) + 1):
         index = np.flatnonzero(plant.cluster == piece)
         if len(index) >= 0.5 * plant.rate:
-            out[index] = free_run(plant.x[index], plant.p[index] + offset, float(np.sqrt(w2)), plant.rate)
+            out[index] = free_motion(plant.x[index], plant.p[index] + offset, float(np.sqrt(w2)), plant.rate)[0]
     return out

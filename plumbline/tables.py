@@ -34,6 +34,11 @@ def _xyz(prefix: str, unit: str, meaning: str) -> list[Column]:
     return [_c(f"{prefix}_{a}", "float", unit, f"{meaning}, {w}") for a, w in zip("xyz", ("right", "forward", "up"), strict=True)]
 
 
+def _with_interval(name: str, unit: str, meaning: str) -> list[Column]:
+    ends = (("low", "lower end of its 95 % interval"), ("high", "upper end"))
+    return [_c(name, "float", unit, meaning), *[_c(f"{name}_{end}", "float", unit, text) for end, text in ends]]
+
+
 KEY = [
     _c("trial", "str", "", "file name without ending; unique in a study"),
     _c("subject", "str", "", "participant_id, with sub-"),
@@ -160,6 +165,83 @@ TABLES: dict[str, list[Column]] = {
         _c("end", "float", "s", "last instant"),
         _c("source", "str", "", "event or found"),
         _c("peak", "float", "N", "largest external force in the window, NaN without shear"),
+    ],
+    # -- trust: regimes of each locus and the switches between them; returning RLS frame by frame
+    "trust": [
+        *KEY,
+        _c("locus", "int", "", "number within the trial"),
+        _c("part", "int", "", "number of the regime within the locus, from 1"),
+        _c("regime", "str", "", "left or right: the ZMP is at that limit; inside: the law rules"),
+        _c("start", "float", "s", "first instant: a switch, or the locus begins"),
+        _c("end", "float", "s", "last instant"),
+        _c("start_frame", "int", "", "first frame"),
+        _c("end_frame", "int", "", "last frame, included"),
+        _c("source", "str", "", "of the start: start (of the locus), found, or event (a person's mark)"),
+        _c("found", "float", "s", "switch as found by change point, also where a mark overrides it; NaN at the start of a locus"),
+        _c("rls", "float", "s", "the same switch by the returning-RLS rule; NaN where the rule sees none"),
+        _c("mark", "float", "s", "`switch` event that belongs to this switch, NaN where none"),
+        _c("mark_distance", "float", "s", "found minus mark"),
+    ],
+    "rls": [
+        *KEY[:2],
+        _c("locus", "int", "", "number within the trial"),
+        _c("frame", "int", "", "from 0 within the trial"),
+        _c("time", "float", "s", "the file's own time"),
+        *[
+            _c(f"{name}_{way}", "float", unit, f"{name} {text}")
+            for name, unit in (("omega", "rad/s"), ("k1", "1"), ("k2", "s"))
+            for way, text in (
+                ("forward", "from the locus' start to this frame"),
+                ("backward", "from its end back to this frame"),
+                ("sd", "standard deviation of the backward pass, pooled noise, correlation counted"),
+            )
+        ],
+        _c("stray", "float", "1", "what the pass that looks for the switch has not expected, in its standard deviations"),
+    ],
+    # -- clusters: loci by omega, and the controller of each cluster
+    "clusters": [
+        *KEY,
+        _c("locus", "int", "", "number within the trial"),
+        _c("kind", "str", "", "kind of the locus"),
+        _c("reach", "float", "m", "farthest CoM from the reference"),
+        _c("omega", "float", "rad/s", "natural frequency from this locus alone; NaN where it cannot be told"),
+        _c("omega_low", "float", "rad/s", "lower end of its 95 % interval"),
+        _c("omega_high", "float", "rad/s", "upper end"),
+        _c("cluster", "int", "", "from 1 in ascending omega; 0 without an estimate"),
+        _c("share", "float", "1", "probability that the locus belongs to this cluster and no other"),
+        _c("gains", "bool", "", "the locus was used for the gains"),
+        _c("note", "str", "", "why it was not; empty where it was"),
+    ],
+    "choice": [
+        _c("subject", "str", "", "participant_id, with sub-"),
+        _c("task", "str", "", "task"),
+        _c("condition", "str", "", "condition, empty where none"),
+        _c("number", "int", "", "number of clusters tried"),
+        _c("score", "float", "1", "mean log density of w2 of loci left out [log s2]"),
+        _c("gain_se", "float", "1", "standard error of the gain over one cluster fewer; NaN for one"),
+        _c("chosen", "bool", "", "the number used"),
+    ],
+    "controller": [
+        _c("subject", "str", "", "participant_id, with sub-"),
+        _c("task", "str", "", "task"),
+        _c("condition", "str", "", "condition, empty where none"),
+        _c("cluster", "int", "", "cluster of omega; 0: all loci of the group"),
+        _c("method", "str", "", "output error, output error with delay, instruments, saturation (least squares, the counter-example)"),
+        *_with_interval("omega", "rad/s", "natural frequency, batch least squares over the cluster"),
+        *_with_interval("reference", "m", "position d that the law returns to"),
+        *_with_interval("k1", "1", "gain on the position"),
+        *_with_interval("k2", "s", "gain on the velocity"),
+        *_with_interval("limit_left", "m", "left limit of the ZMP; NaN where never reached"),
+        *_with_interval("limit_right", "m", "right limit of the ZMP; NaN where never reached"),
+        *_with_interval("delay", "s", "age of the state in the law; NaN where not fitted"),
+        _c("q1_real", "float", "1", "real part of q1; the closed loop's poles are -omega q"),
+        _c("q1_imag", "float", "1", "imaginary part of q1"),
+        _c("q2_real", "float", "1", "real part of q2"),
+        _c("q2_imag", "float", "1", "imaginary part of q2"),
+        _c("feedback_sd", "float", "m", "rms of p - law inside the limits"),
+        _c("error", "float", "m", "rms of simulated against measured CoM; NaN where not simulated"),
+        _c("loci", "int", "", "loci used for the gains"),
+        _c("warning", "str", "", "empty, or why the row should not be trusted"),
     ],
     # -- fit: the base model per locus, condition and subject
     "fit": [

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from plumbline.models.com_zmp import bounded_response, com_acceleration, fit, free_run, zmp_error
+from plumbline.models.com_zmp import bounded_motion, com_acceleration, fit, free_motion, zmp_error
 
 
 def test_a_com_at_rest_over_its_zmp_stays_there() -> None:
@@ -22,15 +22,16 @@ def test_error_is_the_distance_between_measured_and_modelled_zmp() -> None:
 def test_bounded_response_to_a_sine() -> None:
     """p = sin(ct) gives x = sin(ct) w2 / (w2 + c2), away from the ends."""
     t = np.arange(0, 20, 0.005)
-    x = bounded_response(np.sin(2 * t), 3.0, 200.0)
+    x, v = bounded_motion(np.sin(2 * t), 3.0, 200.0)
     np.testing.assert_allclose(x[800:-800], (np.sin(2 * t) * 9 / 13)[800:-800], atol=1e-5)
+    np.testing.assert_allclose(v[800:-800], (2 * np.cos(2 * t) * 9 / 13)[800:-800], atol=1e-4)
 
 
 def test_free_run_reproduces_a_fall() -> None:
     """A ZMP stuck at 0.1 m and a CoM running away from it: the free run follows to a micrometre."""
     t = np.arange(0, 1.2, 0.005)
     x = 0.1 + 0.01 * np.cosh(3 * t)
-    np.testing.assert_allclose(free_run(x, np.full(len(t), 0.1), 3.0, 200.0), x, atol=1e-6)
+    np.testing.assert_allclose(free_motion(x, np.full(len(t), 0.1), 3.0, 200.0)[0], x, atol=1e-6)
 
 
 def test_a_constant_offset_does_not_bias_w2() -> None:

@@ -109,13 +109,15 @@ def fit(acceleration: Array, lever: Array, cluster: NDArray[np.int64], noise: No
     )
 
 
-def bounded_response(p: Array, omega: float, rate: float) -> Array:
+def bounded_motion(p: Array, omega: float, rate: float) -> tuple[Array, Array]:
     """The bounded solution of eq. 1 for a measured ZMP: half the sum of a causal and an anticausal first-order response.
 
     With xi = x + x'/w and eta = x - x'/w, eq. 1 splits into xi' = w (xi - p), run backwards in time, and eta' = -w (eta - p),
-    run forwards; x = (xi + eta)/2.  p: [m], shape (n,), linear between samples.  omega [rad/s].  rate [Hz].  Returns [m], (n,).
+    run forwards; x = (xi + eta)/2.  p: [m], shape (n,), linear between samples.  omega [rad/s].  rate [Hz].
+    Returns x [m] and x' [m/s], each (n,).
     """
-    return (_lagging(p, omega / rate) + _lagging(p[::-1], omega / rate)[::-1]) / 2
+    eta, xi = _lagging(p, omega / rate), _lagging(p[::-1], omega / rate)[::-1]
+    return (xi + eta) / 2, omega * (xi - eta) / 2
 
 
 def _lagging(p: Array, r: float) -> Array:
@@ -130,14 +132,14 @@ def _lagging(p: Array, r: float) -> Array:
     return np.asarray(y)
 
 
-def free_run(x: Array, p: Array, omega: float, rate: float) -> Array:
-    """CoM that eq. 1 gives for the measured ZMP alone; only the two constants of integration are fitted to x.
+def free_motion(x: Array, p: Array, omega: float, rate: float) -> tuple[Array, Array]:
+    """CoM and its velocity that eq. 1 gives for the measured ZMP alone; only the two constants of integration are fitted to x.
 
     Simulating forward from a noisy start state multiplies its error by e^(w t); here the two homogeneous solutions e^(-w t) and
-    e^(-w (T - t)) are fitted instead.  x, p: [m], shape (n,), no NaN.  Returns [m], shape (n,).
+    e^(-w (T - t)) are fitted instead.  x, p: [m], shape (n,), no NaN.  Returns x [m] and x' [m/s], each (n,).
     """
     t = np.arange(len(x)) / rate
     basis = np.column_stack([np.exp(-omega * t), np.exp(-omega * (t[-1] - t))])
-    particular = bounded_response(p, omega, rate)
+    particular, slope = bounded_motion(p, omega, rate)
     ends, *_ = np.linalg.lstsq(basis, x - particular, rcond=None)
-    return np.asarray(particular + basis @ ends)
+    return np.asarray(particular + basis @ ends), np.asarray(slope + basis @ (ends * [-omega, omega]))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-Start = Literal["saturated", "unsaturated", "beyond", "falling"]
+Start = Literal["saturated", "unsaturated", "beyond", "falling", "leaving"]
 
 STEP = 1e-3  # [s] longest integration step
 FALLEN = 0.3  # [m] a locus stops where the CoM is farther than this from 0
@@ -83,7 +83,8 @@ def loci(
 
     omega: [rad/s].  k1: [1].  k2: [s].  limits: left and right border of the ZMP [m].  d: reference [m].  rate: [Hz].
     start: "saturated" (law at its limit, recoverable), "unsaturated", "beyond" (CoM outside the limits, moving back) or
-    "falling" (not recoverable; stops at |x| > 0.3 m).  marker_noise, cop_noise: white, sd [m].  feedback_sd, feedback_time:
+    "falling" (not recoverable; stops at |x| > 0.3 m) or "leaving" (falls too, but its law begins inside the limits: a hard push
+    from the other side).  marker_noise, cop_noise: white, sd [m].  feedback_sd, feedback_time:
     sd [m] and correlation time [s] of the noise added to the wanted ZMP.  delay: age of the state in the law [s]; before the
     start the CoM is taken to have moved uniformly.  Raises ValueError where a delay is shorter than the step or no start
     state of the wanted kind exists.
@@ -107,7 +108,7 @@ def _starts(loop: _Loop, kind: Start, side: Array, rng: np.random.Generator) -> 
     The extrapolated CoM xi = x + v/omega decides: a clipped ZMP can catch it only inside the limits (Hof 2005).
     """
     ranges = {"saturated": (-0.5, 0.9, 0.5, 0.9), "unsaturated": (-0.8, 0.8, -0.6, 0.6)}
-    ranges |= {"beyond": (1.05, 1.6, 0.3, 0.8), "falling": (0.2, 1.2, 1.1, 1.6)}
+    ranges |= {"beyond": (1.05, 1.6, 0.3, 0.8), "falling": (0.2, 1.2, 1.1, 1.6), "leaving": (-1.6, -0.8, 1.02, 1.3)}
     low, high, xi_low, xi_high = ranges[kind]
     reach = np.where(side > 0, loop.right - loop.d, loop.d - loop.left)
     state = np.full((2, len(side)), np.nan)
@@ -119,7 +120,8 @@ def _starts(loop: _Loop, kind: Start, side: Array, rng: np.random.Generator) -> 
         xi = loop.d + side * reach * rng.uniform(xi_low, xi_high, len(side))
         v = loop.omega * (xi - x)
         pull = side * (loop.wanted(x, v, np.zeros(len(side))) - loop.d) / reach
-        good = left & {"saturated": pull > 1.05, "unsaturated": np.abs(pull) < 0.95}.get(kind, pull > 1.0)
+        inside = np.abs(pull) < 0.95
+        good = left & {"saturated": pull > 1.05, "unsaturated": inside, "leaving": inside}.get(kind, pull > 1.0)
         state[:, good] = np.stack([x, v])[:, good]
     raise ValueError(f"no {kind} start state exists for omega={loop.omega}, k1={loop.k1}, k2={loop.k2}")
 

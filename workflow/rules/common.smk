@@ -38,7 +38,9 @@ PART_OF = studies.assign(STUDY.subjects, SIZE, studies.read_parts(Path("results/
 PARTS = sorted(set(PART_OF.values()))
 
 
-PART_TABLES = ["trials", "markers", "plates", "signals", "coverage", "loci", "pushes", "fit", "heldout", "residuals", "where"]
+PART_TABLES = ["trials", "markers", "plates", "signals", "coverage", "loci", "pushes"]
+PART_TABLES += ["trust", "rls", "clusters", "choice", "controller", "fit", "heldout", "residuals", "where"]
+WEAK = {k: config["evaluation"][k] for k in ("half_width", "exponent")}
 
 
 wildcard_constraints:

@@ -1,0 +1,238 @@
+"""Clusters of omega, and the controller of each: tables `clusters`, `choice` and `controller`.
+
+Loci of one subject, task and condition are clustered by the w2 that each gives alone; the number of clusters is what predicts loci left
+out. Batch least squares gives one omega per cluster; the gains come from those of its loci that do not fall. Limits belong to the feet,
+not to omega, and are taken over all loci of the group.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.special import stdtrit
+
+from plumbline import law as laws
+from plumbline import mixture, tables
+from plumbline.estimators.clustered import reach
+from plumbline.fit import Windows, solve, windows
+from plumbline.groups import Group, of_loci
+from plumbline.models.com_zmp import PlantFit
+from plumbline.models.controller import Law, poles
+from plumbline.plant import AXES
+
+Array = NDArray[np.float64]
+Key = tuple[str, str, str]
+
+FEWEST = 3  # loci behind gains
+REGIMES = {"left": -1, "inside": 0, "right": 1}
+
+
+def of_part(
+    signals: pd.DataFrame,
+    pushes: pd.DataFrame,
+    loci: pd.DataFrame,
+    coverage: pd.DataFrame,
+    trust: pd.DataFrame,
+    evaluation: Mapping[str, Any],
+) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
+    """Tables `clusters`, `choice`, `controller` of whole subjects."""
+    members: list[pd.DataFrame] = []
+    choices: list[dict[str, Any]] = []
+    rows: list[dict[str, Any]] = []
+    of_group = group_windows(signals, pushes, loci, coverage, evaluation)
+    for key, mine in loci.groupby(["subject", "task", "condition"], sort=True, observed=True):
+        about = dict(zip(("subject", "task", "condition"), map(str, key), strict=True))
+        weak = of_group.get((about["subject"], about["task"], about["condition"]), [])
+        table, choice = _clustered(mine, weak)
+        choices += [about | c for c in choice]
+        rows += list(_controllers(about, table, weak, signals, mine, trust))
+        members.append(table.drop(columns=["w2", "w2_se"]))
+    return (
+        tables.joined("clusters", members),
+        pd.DataFrame(choices) if choices else tables.empty("choice"),
+        pd.DataFrame(rows) if rows else tables.empty("controller"),
+    )
+
+
+def group_windows(
+    signals: pd.DataFrame, pushes: pd.DataFrame, loci: pd.DataFrame, coverage: pd.DataFrame, evaluation: Mapping[str, Any]
+) -> dict[Key, list[Windows]]:
+    """Lateral test functions of every trial with loci, by (subject, task, condition)."""
+    chosen = set(loci["trial"])
+    mine = signals[signals["trial"].isin(chosen)]
+    out: dict[Key, list[Windows]] = {}
+    for w in windows(mine, pushes, loci, coverage[coverage["trial"].isin(chosen)], evaluation):
+        if AXES[w.axis] == "x":
+            out.setdefault((w.subject, w.task, w.condition), []).append(w)
+    return out
+
+
+def plant_of(weak: Sequence[Windows], chosen: set[tuple[str, int]] | None = None) -> PlantFit | None:
+    """Batch least squares of w2 over the test functions inside loci; chosen: (trial, locus), None for all."""
+    picked = []
+    for w in weak:
+        locus = w.locus[w.picked]
+        good = locus > 0
+        if chosen is not None:
+            good &= np.isin(locus, [number for trial, number in chosen if trial == w.trial])
+        picked.append((w, w.picked[good]))
+    return solve(picked)
+
+
+# -- clusters ---------------------------------------------------------------------------------------------------------
+
+
+def _clustered(loci: pd.DataFrame, weak: Sequence[Windows]) -> tuple[pd.DataFrame, list[dict[str, Any]]]:
+    """Rows of `clusters` (with w2 and w2_se) and of `choice` for one group."""
+    of_trial = {w.trial: w for w in weak}
+    rows = [_alone(locus, of_trial.get(locus["trial"])) for _, locus in loci.iterrows()]
+    table = pd.DataFrame(rows)
+    known = (np.isfinite(table["w2_se"]) & (table["w2"] > 0)).to_numpy()
+    if not known.any():
+        return table, []
+    w2, se = (table.loc[known, c].to_numpy(float) for c in ("w2", "w2_se"))
+    choice = mixture.choose(w2, se)
+    posterior = choice.mixture.posterior(w2, se)
+    table.loc[known, "cluster"] = posterior.argmax(1) + 1
+    table.loc[known, "share"] = posterior.max(1)
+    tried = [
+        {"number": int(k), "score": float(s), "gain_se": float(e), "chosen": int(k) == len(choice.mixture.centre)}
+        for k, s, e in zip(choice.number, choice.score, choice.gain_se, strict=True)
+    ]
+    return table, tried
+
+
+def _alone(locus: pd.Series, weak: Windows | None) -> dict[str, Any]:
+    """What one locus says of omega."""
+    nan = float("nan")
+    row = {k: locus[k] for k in ("trial", "subject", "task", "condition", "locus", "kind")}
+    row |= {"reach": nan, "omega": nan, "omega_low": nan, "omega_high": nan, "w2": nan, "w2_se": nan}
+    row |= {"cluster": 0, "share": nan, "gains": False, "note": "no test function fits into it"}
+    if weak is None:
+        return row | {"note": "its trial has no weak plant equation: see `fit`"}
+    inside = weak.locus == locus["locus"]
+    far = np.abs(weak.plant.x[inside] - locus["reference"])
+    row["reach"] = float(np.nanmax(far)) if np.isfinite(far).any() else nan
+    got = solve([(weak, weak.picked[weak.locus[weak.picked] == locus["locus"]])], blocks=True)
+    if got is None:
+        return row
+    low, high = got.omega_interval()
+    widen = float(stdtrit(max(got.dof, 1), 0.975)) / 1.96  # few blocks: their scatter is itself uncertain
+    se = float(np.sqrt(got.covariance[0, 0])) * widen
+    row |= {"omega": got.omega, "omega_low": low, "omega_high": high, "w2": got.w2, "w2_se": se}
+    return row | {"note": "" if got.w2 > 0 else "w2 is not positive"}
+
+
+# -- controllers ------------------------------------------------------------------------------------------------------
+
+
+def _controllers(
+    about: dict[str, str], table: pd.DataFrame, weak: Sequence[Windows], signals: pd.DataFrame, loci: pd.DataFrame, trust: pd.DataFrame
+) -> Iterator[dict[str, Any]]:
+    """Rows of `controller` for one group; sets `gains` and `note` in `table`."""
+    numbers = sorted(set(table["cluster"]) - {0})
+    for cluster in [0, *numbers] if len(numbers) > 1 else [0]:
+        mine = table if cluster == 0 else table[table["cluster"] == cluster]
+        plant = plant_of(weak, set(zip(mine["trial"], mine["locus"], strict=True)))
+        if plant is None or plant.w2 <= 0:
+            yield _blank(about | {"cluster": cluster}) | {"warning": "omega cannot be told from these loci, so neither can the gains"}
+            continue
+        wanted = loci.merge(mine[["trial", "locus"]], on=["trial", "locus"])
+        key = (about["subject"], about["task"], about["condition"])
+        group = next(of_loci(signals, wanted, {key: plant.omega}), None)
+        if cluster == 0:
+            _note(table, group)
+        yield from _rows(about | {"cluster": cluster}, plant, group, _regimes(group, trust))
+
+
+def _note(table: pd.DataFrame, group: Group | None) -> None:
+    """Say of each locus whether it was used for the gains."""
+    table.loc[table["kind"] == "falling", "note"] = "falls: its ZMP only shows the limit"
+    if group is None:
+        return
+    steady = group.loci[group.steady]
+    used = set(zip(steady["trial"], steady["locus"], strict=True))
+    table["gains"] = [key in used for key in zip(table["trial"], table["locus"], strict=True)]
+    for locus, why in group.left_out:
+        table.loc[(table["trial"] == locus["trial"]) & (table["locus"] == locus["locus"]), "note"] = why
+
+
+def _regimes(group: Group | None, trust: pd.DataFrame) -> NDArray[np.int8] | None:
+    """Regime of each frame of a group's batch, from the table `trust`; None where a locus has no regimes."""
+    if group is None:
+        return None
+    out = np.zeros(group.batch.x.shape, np.int8)
+    parts = dict(tuple(trust.groupby(["trial", "locus"], observed=True)))
+    for j, (trial, locus) in enumerate(zip(group.loci["trial"], group.loci["locus"], strict=True)):
+        mine = parts.get((trial, locus))
+        if mine is None:
+            return None
+        time = group.starts[j] + (np.arange(len(out)) - group.batch.lead) / group.batch.rate
+        part = np.searchsorted(mine["start"].to_numpy(), time + 1e-9, side="right") - 1
+        out[:, j] = mine["regime"].map(REGIMES).to_numpy()[np.maximum(part, 0)]
+    return out
+
+
+def _blank(about: dict[str, Any]) -> dict[str, Any]:
+    nan = float("nan")
+    row = {c.name: {"str": "", "int": 0, "float": nan}[c.kind] for c in tables.TABLES["controller"]}
+    return row | about | {"method": "output error"}
+
+
+def _rows(about: dict[str, Any], plant: PlantFit, group: Group | None, regime: NDArray[np.int8] | None) -> Iterator[dict[str, Any]]:
+    """One row per method."""
+    low, high = plant.omega_interval()
+    base = _blank(about) | {"omega": plant.omega, "omega_low": low, "omega_high": high}
+    count = int(group.steady.sum()) if group is not None else 0
+    got = None
+    if group is not None and regime is not None and count >= FEWEST:
+        got = laws.identify(group.batch, regime, plant.omega, group.steady)
+    if got is None:
+        said = f"{count} loci do not fall and have an unbroken CoM and ZMP; {FEWEST} are needed"
+        yield base | {"loci": count, "warning": said if count < FEWEST else "the gains cannot be told from these loci"}
+        return
+    base |= {"feedback_sd": got.saturation.inside_rms, "loci": count}
+    plain, delayed = got.output_error, got.delayed
+    base |= _limit_columns(plain.law, got)
+    yield base | _gains(plain.law, plain.covariance, plain.loci, plant.omega) | {"error": plain.error, "warning": _warning(got)}
+    late = _gains(delayed.law, delayed.covariance, delayed.loci, plant.omega) | {"error": delayed.error}
+    yield base | late | {"method": "output error with delay", "warning": "" if delayed.converged else "the search did not settle"}
+    if got.instruments is not None:
+        row = _gains(got.instruments.law, got.instruments.covariance, got.instruments.loci, plant.omega)
+        yield base | row | {"method": "instruments"}
+    least = got.saturation
+    row = _gains(least.law, least.covariance, least.loci, plant.omega)
+    yield base | row | {"method": "saturation", "warning": "least squares: too small in the gains by feedback noise; for comparison only"}
+
+
+def _gains(law: Law, covariance: Array, loci: int, omega: float) -> dict[str, Any]:
+    names = ("reference", "k1", "k2", "delay")[: len(covariance)]
+    row: dict[str, Any] = {}
+    for k, name in enumerate(names):
+        value, half = law[5 if name == "delay" else k], reach(covariance[k, k], loci)
+        row |= {name: value, f"{name}_low": max(value - half, 0.0) if name == "delay" else value - half, f"{name}_high": value + half}
+    q1, q2 = poles(law.k1, law.k2, omega)
+    return row | {"q1_real": q1.real, "q1_imag": q1.imag, "q2_real": q2.real, "q2_imag": q2.imag}
+
+
+def _limit_columns(law: Law, got: laws.Controller) -> dict[str, float]:
+    row: dict[str, float] = {}
+    for name, value, se, loci in zip(("limit_left", "limit_right"), (law.left, law.right), got.limit_se, got.limit_loci, strict=True):
+        known = np.isfinite(value)
+        half = reach(se**2, loci) if known else float("nan")
+        row |= {name: value if known else float("nan"), f"{name}_low": value - half, f"{name}_high": value + half}
+    return row
+
+
+def _warning(got: laws.Controller) -> str:
+    """Why the gains of the plain law should not be trusted."""
+    plain, delayed = got.output_error, got.delayed
+    if not plain.converged:
+        return "the search did not settle"
+    if plain.law.k1 <= 1:
+        return "k1 is not above 1: this law does not bring the CoM back"
+    if got.late:
+        return f"a delay of {1e3 * delayed.law.delay:.0f} ms lowers the error from {1e3 * plain.error:.2f} to {1e3 * delayed.error:.2f} mm"
+    return ""

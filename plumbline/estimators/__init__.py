@@ -1,0 +1,1 @@
+"""Estimators of the piecewise controller, one method per file."""

@@ -1,0 +1,125 @@
+"""Loci of one subject, task and condition as a batch for the identification of the controller."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from plumbline import batch, filters
+from plumbline.batch import LEAD, Batch
+from plumbline.plant import sampling_rate
+
+Array = NDArray[np.float64]
+
+HORIZON = 5.0  # [s] of a locus that is used: later the person sways, and noise alone moves the CoM
+SHORTEST = 0.3  # [s] of a locus without a gap
+FASTEST = 200.0  # [Hz] to which faster recordings are interpolated
+PAST_CUTOFF = 6.0  # [Hz] low-pass of the motion before a locus
+
+
+@dataclass(frozen=True)
+class Group:
+    """Loci of one subject, task and condition that have an unbroken CoM and ZMP.
+
+    loci: their rows of the table, in the order of the batch's columns.  starts: time of each one's first frame [s], shape (m,).
+    left_out: (row of the table, why not).
+    """
+
+    subject: str
+    task: str
+    condition: str
+    loci: pd.DataFrame
+    starts: Array
+    batch: Batch
+    left_out: Sequence[tuple[pd.Series, str]]
+
+    @property
+    def steady(self) -> NDArray[np.bool_]:
+        """Loci that do not fall, shape (m,)."""
+        return (self.loci["kind"] != "falling").to_numpy()
+
+    @property
+    def about(self) -> dict[str, str]:
+        """What the group is called in tables."""
+        return {"subject": self.subject, "task": self.task, "condition": self.condition}
+
+
+def of_loci(signals: pd.DataFrame, loci: pd.DataFrame, omega: dict[tuple[str, str, str], float]) -> Iterator[Group]:
+    """Groups of whole subjects.
+
+    signals, loci: tables.  omega: (subject, task, condition) -> natural frequency that smooths its loci [rad/s]; groups without one
+    are left out.
+    """
+    rows = signals.groupby("trial", sort=True, observed=True).indices
+    for (subject, task, condition), mine in loci.groupby(["subject", "task", "condition"], sort=True, observed=True):
+        key = (str(subject), str(task), str(condition))
+        if key in omega:
+            frames = {trial: signals.iloc[rows[trial]] for trial in mine["trial"].unique() if trial in rows}
+            group = _group(key, mine, frames, omega[key])
+            if group is not None:
+                yield group
+
+
+def _group(key: tuple[str, str, str], loci: pd.DataFrame, frames: dict[Any, pd.DataFrame], omega: float) -> Group | None:
+    motions = {trial: _Motion.of(table) for trial, table in frames.items()}
+    if not motions:
+        return None
+    rate = min(float(np.median([m.rate for m in motions.values()])), FASTEST)
+    cut, kept, left_out = [], [], []
+    for _, locus in loci.iterrows():
+        piece = motions[locus["trial"]].cut(locus["start"], locus["end"], rate) if locus["trial"] in motions else None
+        if piece is None or len(piece[0]) < max(SHORTEST * rate, 8):
+            left_out.append((locus, f"no unbroken CoM and ZMP of {SHORTEST} s"))
+        else:
+            cut.append(piece)
+            kept.append(locus)
+    if not cut:
+        return None
+    made = batch.of_loci([c[0] for c in cut], [c[1] for c in cut], omega, rate, [c[2] for c in cut])
+    return Group(*key, pd.DataFrame(kept).reset_index(drop=True), np.array([c[3] for c in cut]), made, left_out)
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """One trial: time [s], unfiltered CoM and ZMP [m], low-passed CoM [m] and its velocity [m/s], each (n,); rate [Hz]."""
+
+    time: Array
+    x: Array
+    p: Array
+    slow: Array
+    speed: Array
+    rate: float
+
+    @classmethod
+    def of(cls, table: pd.DataFrame) -> "_Motion":
+        time, x, p = (table[c].to_numpy(float) for c in ("time", "com_x", "zmp_x"))
+        rate = sampling_rate(time)
+        slow = filters.low_pass(x[:, None], time, min(PAST_CUTOFF, 0.2 * rate))
+        return cls(time, x, p, slow[:, 0], filters.derivatives(slow, time)[0][:, 0], rate)
+
+    def cut(self, start: float, end: float, rate: float) -> tuple[Array, Array, tuple[Array, Array], float] | None:
+        """CoM, ZMP, the past (position, velocity) of a locus at `rate`, and its first instant; up to its first gap."""
+        first, last = np.searchsorted(self.time, [start - 1e-9, min(end, start + HORIZON) + 1e-9])
+        good = np.isfinite(self.x[first:last] + self.p[first:last])
+        if not good.any():
+            return None
+        first += int(np.argmax(good))
+        gap = np.flatnonzero(~np.isfinite(self.x[first:last] + self.p[first:last]))
+        last = first + int(gap[0]) if len(gap) else last
+        if last - first < 2:
+            return None
+        t = np.arange(self.time[first], self.time[last - 1] + 0.5 / rate, 1 / rate)
+        t = t[t <= self.time[last - 1] + 1e-9]
+        past = np.arange(-round(LEAD * rate), 0) / rate + self.time[first]
+        before = slice(max(0, first - round(1.5 * LEAD * self.rate)), first)
+        known = np.flatnonzero(~np.isfinite(self.slow[before] + self.speed[before]))
+        begin = before.start + (int(known[-1]) + 1 if len(known) else 0)
+        past = past[past >= self.time[begin] - 1e-9] if begin < first else past[:0]
+
+        def at(signal: Array, when: Array) -> Array:
+            return np.interp(when, self.time[begin:last], signal[begin:last])
+
+        return at(self.x, t), at(self.p, t), (at(self.slow, past), at(self.speed, past)), float(self.time[first])
