@@ -1,9 +1,10 @@
 """Loci of the paper's closed loop as a batch, and what their truth says of the switches."""
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
-from plumbline import batch
+from plumbline import batch, filters, tables
 from plumbline.simulate import pendulum
 
 PUBLISHED = {"A": {"omega": 2.740, "k1": 4.038, "k2": 0.875}, "B": {"omega": 2.914, "k1": 2.204, "k2": 0.549}}
@@ -60,3 +61,43 @@ def switch_errors(
         more += len(set(found) - set(near))
     out = np.array(errors)
     return out[np.abs(out) < 0.15], missed, more
+
+
+def tabled(
+    groups: dict[str, list[pendulum.Locus]], *, omega: float, kinds: dict[str, str] | None = None
+) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame, pd.DataFrame, pd.DataFrame]:
+    """Tables signals, pushes, loci, coverage, trials of recordings with one locus each.
+
+    groups: condition -> loci.  kinds: condition -> kind of its loci.  omega only sets the filtered columns' height.
+    """
+    frames, loci, about, trials = [], [], [], []
+    for condition, members in groups.items():
+        for k, one in enumerate(members):
+            key = {
+                "trial": f"sub-01_task-lateral_acq-{condition}_run-{k:03d}",
+                "subject": "sub-01",
+                "task": "lateral",
+                "condition": condition,
+            }
+            frames.append(_frames(one, key, omega))
+            kind = (kinds or {}).get(condition, "recovering")
+            loci.append(key | {
+                "locus": 1, "start": 0.0, "end": one.time[-1], "start_frame": 0, "end_frame": len(one.time) - 1, "kind": kind,
+                "side": one.side, "source": "event", "reference": 0.0,
+            })  # fmt: skip
+            about.append(key | {"com_method": "lab", "filtered_before": False, "mass": 70.0, "files": ""})
+            trials.append({"trial": key["trial"], "events": "[]"})
+    pushes = tables.empty("pushes")
+    return pd.concat(frames, ignore_index=True), pushes, pd.DataFrame(loci), pd.DataFrame(about), pd.DataFrame(trials)
+
+
+def _frames(one: pendulum.Locus, key: dict[str, str], omega: float) -> pd.DataFrame:
+    zero = np.zeros(len(one.time))
+    slow = filters.low_pass(np.column_stack([one.x, one.p]), one.time, 2.0)
+    columns = {
+        "frame": np.arange(len(one.time)), "time": one.time, "com_x": one.x, "com_y": zero, "com_z": zero + 9.81 / omega**2,
+        "zmp_x": one.p, "zmp_y": zero, "zmp_z": zero, "grf_x": 70 * omega**2 * (one.x_true - one.p_true), "grf_y": zero,
+        "grf_z": zero + 70 * 9.81, "com_lp_x": slow[:, 0], "zmp_lp_x": slow[:, 1],
+        "com_ddot_x": filters.derivatives(slow[:, :1], one.time)[1][:, 0],
+    }  # fmt: skip
+    return pd.DataFrame(key | columns)

@@ -1,9 +1,9 @@
 """CoM and velocity that the estimators see, against the simulated truth."""
 
 import numpy as np
+from made_loci import PUBLISHED, RATE, batched, made
 
 from plumbline import batch
-from made_loci import PUBLISHED, RATE, batched, made
 
 
 def test_velocity_is_right_up_to_both_ends() -> None:

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from made_loci import PUBLISHED, batched, made, switch_errors
 
 from plumbline import law as laws
 from plumbline.estimators.clustered import reach
-from made_loci import PUBLISHED, batched, made, switch_errors
 
 LIMITS = [(-0.1, 0.1), (-0.09, 0.13)]
 
