@@ -71,13 +71,16 @@ def smoothed(x: Array, p: Array, omega: float, rate: float) -> tuple[Array, Arra
     x, p: measured [m], shape (n,), no NaN, n >= 4.  omega [rad/s].  rate [Hz].
     """
     free, speed = free_motion(x, p, omega, rate)
-    rest = _slow(x - free, rate)
+    rest = slow(x - free, rate, BEND)
     return free + rest, speed + np.gradient(rest, 1 / rate)
 
 
-def _slow(y: Array, rate: float) -> Array:
-    """Whittaker smoother with a penalty on third differences: half the amplitude at BEND, whole parabolas pass, ends included."""
-    weight = (2 * np.sin(np.pi * BEND / rate)) ** -6
+def slow(y: Array, rate: float, bend: float) -> Array:
+    """Whittaker smoother with a penalty on third differences: half the amplitude at `bend` [Hz], whole parabolas pass, ends included.
+
+    y: (n,), n >= 4, no NaN.  rate [Hz].  Returns (n,).
+    """
+    weight = (2 * np.sin(np.pi * bend / rate)) ** -6
     band = np.zeros((4, len(y)))
     step = np.array([-1.0, 3.0, -3.0, 1.0])
     for i in range(4):

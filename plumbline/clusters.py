@@ -155,7 +155,8 @@ def _note(table: pd.DataFrame, group: Group | None) -> None:
     steady = group.loci[group.steady]
     used = set(zip(steady["trial"], steady["locus"], strict=True))
     table["gains"] = [key in used for key in zip(table["trial"], table["locus"], strict=True)]
-    for locus, why in group.left_out:
+    short = [(group.loci.iloc[j], why) for j, why in enumerate(group.shortened) if why]
+    for locus, why in [*group.left_out, *short]:
         table.loc[(table["trial"] == locus["trial"]) & (table["locus"] == locus["locus"]), "note"] = why
 
 
@@ -197,8 +198,9 @@ def _rows(about: dict[str, Any], plant: PlantFit, group: Group | None, regime: N
     plain, delayed = got.output_error, got.delayed
     base |= _limit_columns(plain.law, got)
     yield base | _gains(plain.law, plain.covariance, plain.loci, plant.omega) | {"error": plain.error, "warning": _warning(got)}
-    late = _gains(delayed.law, delayed.covariance, delayed.loci, plant.omega) | {"error": delayed.error}
-    yield base | late | {"method": "output error with delay", "warning": "" if delayed.converged else "the search did not settle"}
+    if delayed is not None:
+        row = _gains(delayed.law, delayed.covariance, delayed.loci, plant.omega) | {"error": delayed.error}
+        yield base | row | {"method": "output error with delay", "warning": "" if delayed.converged else "the search did not settle"}
     if got.instruments is not None:
         row = _gains(got.instruments.law, got.instruments.covariance, got.instruments.loci, plant.omega)
         yield base | row | {"method": "instruments"}
@@ -233,6 +235,6 @@ def _warning(got: laws.Controller) -> str:
         return "the search did not settle"
     if plain.law.k1 <= 1:
         return "k1 is not above 1: this law does not bring the CoM back"
-    if got.late:
+    if delayed is not None and got.late:
         return f"a delay of {1e3 * delayed.law.delay:.0f} ms lowers the error from {1e3 * plain.error:.2f} to {1e3 * delayed.error:.2f} mm"
     return ""

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from plumbline import batch, filters
+from plumbline import batch
 from plumbline.batch import LEAD, Batch
 from plumbline.plant import sampling_rate
 
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 HORIZON = 5.0  # [s] of a locus that is used: later the person sways, and noise alone moves the CoM
 SHORTEST = 0.3  # [s] of a locus without a gap
 FASTEST = 200.0  # [Hz] to which faster recordings are interpolated
-PAST_CUTOFF = 6.0  # [Hz] low-pass of the motion before a locus
+PAST_BEND = 6.0  # [Hz] smoother of the motion before a locus, in which somebody may push
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Group:
     """Loci of one subject, task and condition that have an unbroken CoM and ZMP.
 
     loci: their rows of the table, in the order of the batch's columns.  starts: time of each one's first frame [s], shape (m,).
-    left_out: (row of the table, why not).
+    left_out: (row of the table, why not).  shortened: what each locus lost to a gap, in words; empty where nothing, length m.
     """
 
     subject: str
@@ -35,6 +35,7 @@ class Group:
     starts: Array
     batch: Batch
     left_out: Sequence[tuple[pd.Series, str]]
+    shortened: Sequence[str]
 
     @property
     def steady(self) -> NDArray[np.bool_]:
@@ -68,7 +69,7 @@ def _group(key: tuple[str, str, str], loci: pd.DataFrame, frames: dict[Any, pd.D
     if not motions:
         return None
     rate = min(float(np.median([m.rate for m in motions.values()])), FASTEST)
-    cut, kept, left_out = [], [], []
+    cut, kept, left_out, shortened = [], [], [], []
     for _, locus in loci.iterrows():
         piece = motions[locus["trial"]].cut(locus["start"], locus["end"], rate) if locus["trial"] in motions else None
         if piece is None or len(piece[0]) < max(SHORTEST * rate, 8):
@@ -76,29 +77,28 @@ def _group(key: tuple[str, str, str], loci: pd.DataFrame, frames: dict[Any, pd.D
         else:
             cut.append(piece)
             kept.append(locus)
+            first, last = piece[3], piece[3] + (len(piece[0]) - 1) / rate
+            whole = first <= locus["start"] + 1.5 / rate and last >= min(locus["end"], locus["start"] + HORIZON) - 1.5 / rate
+            shortened.append("" if whole else f"a gap: only {first:.2f} to {last:.2f} s is used")
     if not cut:
         return None
     made = batch.of_loci([c[0] for c in cut], [c[1] for c in cut], omega, rate, [c[2] for c in cut])
-    return Group(*key, pd.DataFrame(kept).reset_index(drop=True), np.array([c[3] for c in cut]), made, left_out)
+    return Group(*key, pd.DataFrame(kept).reset_index(drop=True), np.array([c[3] for c in cut]), made, left_out, shortened)
 
 
 @dataclass(frozen=True)
 class _Motion:
-    """One trial: time [s], unfiltered CoM and ZMP [m], low-passed CoM [m] and its velocity [m/s], each (n,); rate [Hz]."""
+    """One trial: time [s], unfiltered CoM and ZMP [m], each (n,); rate [Hz]."""
 
     time: Array
     x: Array
     p: Array
-    slow: Array
-    speed: Array
     rate: float
 
     @classmethod
     def of(cls, table: pd.DataFrame) -> "_Motion":
         time, x, p = (table[c].to_numpy(float) for c in ("time", "com_x", "zmp_x"))
-        rate = sampling_rate(time)
-        slow = filters.low_pass(x[:, None], time, min(PAST_CUTOFF, 0.2 * rate))
-        return cls(time, x, p, slow[:, 0], filters.derivatives(slow, time)[0][:, 0], rate)
+        return cls(time, x, p, sampling_rate(time))
 
     def cut(self, start: float, end: float, rate: float) -> tuple[Array, Array, tuple[Array, Array], float] | None:
         """CoM, ZMP, the past (position, velocity) of a locus at `rate`, and its first instant; up to its first gap."""
@@ -113,13 +113,20 @@ class _Motion:
             return None
         t = np.arange(self.time[first], self.time[last - 1] + 0.5 / rate, 1 / rate)
         t = t[t <= self.time[last - 1] + 1e-9]
-        past = np.arange(-round(LEAD * rate), 0) / rate + self.time[first]
-        before = slice(max(0, first - round(1.5 * LEAD * self.rate)), first)
-        known = np.flatnonzero(~np.isfinite(self.slow[before] + self.speed[before]))
-        begin = before.start + (int(known[-1]) + 1 if len(known) else 0)
-        past = past[past >= self.time[begin] - 1e-9] if begin < first else past[:0]
+        x, p = (np.interp(t, self.time[first:last], one[first:last]) for one in (self.x, self.p))
+        return x, p, self._past(int(first), rate), float(self.time[first])
 
-        def at(signal: Array, when: Array) -> Array:
-            return np.interp(when, self.time[begin:last], signal[begin:last])
-
-        return at(self.x, t), at(self.p, t), (at(self.slow, past), at(self.speed, past)), float(self.time[first])
+    def _past(self, first: int, rate: float) -> tuple[Array, Array]:
+        """Position and velocity in the LEAD before frame `first`, as far back as there is no gap."""
+        begin = max(0, first - round(2 * LEAD * self.rate))
+        gap = np.flatnonzero(~np.isfinite(self.x[begin:first]))
+        begin += int(gap[-1]) + 1 if len(gap) else 0
+        end = min(len(self.x), first + round(LEAD * self.rate))
+        after = np.flatnonzero(~np.isfinite(self.x[first:end]))
+        end = first + int(after[0]) if len(after) else end
+        if first - begin < 2 or end - begin < 8:
+            return np.empty(0), np.empty(0)
+        slow = batch.slow(self.x[begin:end], self.rate, PAST_BEND)
+        speed = np.gradient(slow, self.time[begin:end])
+        when = self.time[first] - np.arange(min(round(LEAD * rate), int((first - begin) * rate / self.rate)), 0, -1) / rate
+        return np.interp(when, self.time[begin:end], slow), np.interp(when, self.time[begin:end], speed)

@@ -66,13 +66,13 @@ def thinned(batch: Batch, regime: Regime) -> tuple[Batch, Regime]:
 class Controller:
     """A group's controller by every method.
 
-    delayed: output error with a free delay.  instruments: at the delay of the law that `late` chooses.
+    delayed: output error with a free delay, None where none was looked for.  instruments: at the delay of the law that `late` chooses.
     limit_se, limit_loci: standard error of (left, right) clustered by locus [m], and the loci that reached them.
     """
 
     saturation: Saturation
     output_error: OutputError
-    delayed: OutputError
+    delayed: OutputError | None
     instruments: Instruments | None
     limit_se: tuple[float, float]
     limit_loci: tuple[int, int]
@@ -83,15 +83,17 @@ class Controller:
         return _late(self.output_error, self.delayed)
 
 
-def _late(plain: OutputError, delayed: OutputError) -> bool:
+def _late(plain: OutputError, delayed: OutputError | None) -> bool:
+    if delayed is None:
+        return False
     low = delayed.law.delay - reach(delayed.covariance[3, 3], delayed.loci)
     return bool(low > 0 and delayed.error < (1 - MATTERS) * plain.error)
 
 
-def identify(batch: Batch, regime: Regime, omega: float, steady: Mask) -> Controller | None:
+def identify(batch: Batch, regime: Regime, omega: float, steady: Mask, *, delay: bool = True) -> Controller | None:
     """Limits from all loci and gains by each method from those that do not fall (steady, (m,)), for known regimes and omega.
 
-    None where the gains cannot be told.
+    delay: look for one too (three quarters of the time).  None where the gains cannot be told.
     """
     least = saturation.fit(batch.take(steady)) if steady.any() else None
     if least is None or not np.isfinite(least.law.d):
@@ -100,8 +102,8 @@ def identify(batch: Batch, regime: Regime, omega: float, steady: Mask) -> Contro
     coarse, thin = thinned(batch.take(steady), regime[:, steady])
     plain = output_error.fit(coarse, thin, start, omega)
     errors = [_limit_se(batch, regime, side, limit) for side, limit in ((-1, start.left), (1, start.right))]
-    delayed = output_error.search(coarse, thin, plain.law, omega)
-    law = delayed.law if _late(plain, delayed) else plain.law
+    delayed = output_error.search(coarse, thin, plain.law, omega) if delay else None
+    law = delayed.law if delayed is not None and _late(plain, delayed) else plain.law
     return Controller(
         least,
         plain,

@@ -210,7 +210,7 @@ TABLES: dict[str, list[Column]] = {
         _c("cluster", "int", "", "from 1 in ascending omega; 0 without an estimate"),
         _c("share", "float", "1", "probability that the locus belongs to this cluster and no other"),
         _c("gains", "bool", "", "the locus was used for the gains"),
-        _c("note", "str", "", "why it was not; empty where it was"),
+        _c("note", "str", "", "why it was not, or what of it; empty where it was, whole"),
     ],
     "choice": [
         _c("subject", "str", "", "participant_id, with sub-"),

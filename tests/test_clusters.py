@@ -113,3 +113,16 @@ def test_a_study_without_loci_has_empty_tables() -> None:
     got = clusters.of_part(signals, pushes, loci.iloc[:0], coverage, tables.empty("trust"), WEAK)
     assert [len(t) for t in got] == [0, 0, 0]
     assert set(got[2].columns) == {c.name for c in tables.TABLES["controller"]}
+
+
+def test_a_gap_is_said() -> None:
+    """A locus with a gap is used up to it and says so; one that is all gap is left out and says so."""
+    signals, pushes, loci, coverage, trials = tabled({"": made("A", 43, n=6, starts=("saturated",))}, omega=2.740)
+    first, second = sorted(loci["trial"])[:2]
+    signals.loc[(signals["trial"] == first) & signals["time"].between(2.0, 2.1), "com_x"] = np.nan
+    signals.loc[signals["trial"] == second, "zmp_x"] = np.nan
+    members = run((signals, pushes, loci, coverage, trials))[0].set_index("trial")
+    assert members.loc[first, "gains"]
+    assert "only 0.00 to 2.00 s" in members.loc[first, "note"]
+    assert not members.loc[second, "gains"]
+    assert "no weak plant" in members.loc[second, "note"] or "no unbroken" in members.loc[second, "note"]

@@ -83,6 +83,7 @@ def test_a_neural_delay_is_found(name: str, delay: float) -> None:
     got = laws.identify(b, found.regime, omega, steady)
     assert got is not None
     assert got.late
+    assert got.delayed is not None
     assert got.delayed.law.delay == pytest.approx(delay, abs=0.01)
     assert abs(got.output_error.law.k1 / PUBLISHED[name]["k1"] - 1) > 0.15
     assert abs(got.delayed.law.k1 / PUBLISHED[name]["k1"] - 1) < 0.05
