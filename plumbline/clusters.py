@@ -20,7 +20,6 @@ from plumbline.fit import Windows, solve, windows
 from plumbline.groups import Group, of_loci
 from plumbline.models.com_zmp import PlantFit
 from plumbline.models.controller import Law, poles
-from plumbline.plant import AXES
 
 Array = NDArray[np.float64]
 Key = tuple[str, str, str]
@@ -47,7 +46,7 @@ def of_part(
         weak = of_group.get((about["subject"], about["task"], about["condition"]), [])
         table, choice = _clustered(mine, weak)
         choices += [about | c for c in choice]
-        rows += list(_controllers(about, table, weak, signals, mine, trust))
+        rows += list(_controllers(about, table, weak, signals, pushes, mine, trust))
         members.append(table.drop(columns=["w2", "w2_se"]))
     return (
         tables.joined("clusters", members),
@@ -63,9 +62,8 @@ def group_windows(
     chosen = set(loci["trial"])
     mine = signals[signals["trial"].isin(chosen)]
     out: dict[Key, list[Windows]] = {}
-    for w in windows(mine, pushes, loci, coverage[coverage["trial"].isin(chosen)], evaluation):
-        if AXES[w.axis] == "x":
-            out.setdefault((w.subject, w.task, w.condition), []).append(w)
+    for w in windows(mine, pushes, loci, coverage[coverage["trial"].isin(chosen)], evaluation, axes=("lateral",)):
+        out.setdefault((w.subject, w.task, w.condition), []).append(w)
     return out
 
 
@@ -129,11 +127,17 @@ def _alone(locus: pd.Series, weak: Windows | None) -> dict[str, Any]:
 
 
 def _controllers(
-    about: dict[str, str], table: pd.DataFrame, weak: Sequence[Windows], signals: pd.DataFrame, loci: pd.DataFrame, trust: pd.DataFrame
+    about: dict[str, str],
+    table: pd.DataFrame,
+    weak: Sequence[Windows],
+    signals: pd.DataFrame,
+    pushes: pd.DataFrame,
+    loci: pd.DataFrame,
+    trust: pd.DataFrame,
 ) -> Iterator[dict[str, Any]]:
     """Rows of `controller` for one group; sets `gains` and `note` in `table`."""
     numbers = sorted(set(table["cluster"]) - {0})
-    for cluster in [0, *numbers] if len(numbers) > 1 else [0]:
+    for cluster in numbers if len(numbers) > 1 else [0]:  # gains over loci of several omegas are nobody's
         mine = table if cluster == 0 else table[table["cluster"] == cluster]
         plant = plant_of(weak, set(zip(mine["trial"], mine["locus"], strict=True)))
         if plant is None or plant.w2 <= 0:
@@ -141,9 +145,8 @@ def _controllers(
             continue
         wanted = loci.merge(mine[["trial", "locus"]], on=["trial", "locus"])
         key = (about["subject"], about["task"], about["condition"])
-        group = next(of_loci(signals, wanted, {key: plant.omega}), None)
-        if cluster == 0:
-            _note(table, group)
+        group = next(of_loci(signals, pushes, wanted, {key: plant.omega}), None)
+        _note(table, group)
         yield from _rows(about | {"cluster": cluster}, plant, group, _regimes(group, trust))
 
 
@@ -154,7 +157,7 @@ def _note(table: pd.DataFrame, group: Group | None) -> None:
         return
     steady = group.loci[group.steady]
     used = set(zip(steady["trial"], steady["locus"], strict=True))
-    table["gains"] = [key in used for key in zip(table["trial"], table["locus"], strict=True)]
+    table["gains"] |= np.array([key in used for key in zip(table["trial"], table["locus"], strict=True)])
     short = [(group.loci.iloc[j], why) for j, why in enumerate(group.shortened) if why]
     for locus, why in [*group.left_out, *short]:
         table.loc[(table["trial"] == locus["trial"]) & (table["locus"] == locus["locus"]), "note"] = why

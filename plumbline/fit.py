@@ -1,6 +1,6 @@
 """Identify the base model, x'' = w2 (x - p), and judge it on trials left out."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -70,9 +70,10 @@ def windows(
     loci: pd.DataFrame,
     coverage: pd.DataFrame,
     evaluation: Mapping[str, Any],
+    axes: Collection[str] = tuple(AXES),
 ) -> Iterator[Windows]:
     """The weak plant of every trial and axis."""
-    settings = {k: evaluation[k] for k in ("half_width", "exponent")}
+    settings: dict[str, Any] = {k: evaluation[k] for k in ("half_width", "exponent")} | {"axes": axes}
     for about, frames, plants in of_trials(signals, pushes, coverage, **settings):
         inside = locus_of_frames(frames, loci[loci["trial"] == about["trial"]])
         for axis, plant in plants.items():

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from plumbline import batch
 from plumbline.batch import LEAD, Batch
-from plumbline.plant import sampling_rate
+from plumbline.plant import PUSH_MARGIN, rows_of, sampling_rate
 
 Array = NDArray[np.float64]
 
@@ -48,37 +48,47 @@ class Group:
         return {"subject": self.subject, "task": self.task, "condition": self.condition}
 
 
-def of_loci(signals: pd.DataFrame, loci: pd.DataFrame, omega: dict[tuple[str, str, str], float]) -> Iterator[Group]:
+def of_loci(signals: pd.DataFrame, pushes: pd.DataFrame, loci: pd.DataFrame, omega: dict[tuple[str, str, str], float]) -> Iterator[Group]:
     """Groups of whole subjects.
 
-    signals, loci: tables.  omega: (subject, task, condition) -> natural frequency that smooths its loci [rad/s]; groups without one
-    are left out.
+    signals, pushes, loci: tables; a locus is used from PUSH_MARGIN after the push that it follows.
+    omega: (subject, task, condition) -> natural frequency that smooths its loci [rad/s]; groups without one are left out.
     """
     rows = signals.groupby("trial", sort=True, observed=True).indices
     for (subject, task, condition), mine in loci.groupby(["subject", "task", "condition"], sort=True, observed=True):
         key = (str(subject), str(task), str(condition))
         if key in omega:
-            frames = {trial: signals.iloc[rows[trial]] for trial in mine["trial"].unique() if trial in rows}
-            group = _group(key, mine, frames, omega[key])
+            frames = {trial: rows_of(signals, rows[trial]) for trial in mine["trial"].unique() if trial in rows}
+            group = _group(key, mine, _first_used(mine, pushes), frames, omega[key])
             if group is not None:
                 yield group
 
 
-def _group(key: tuple[str, str, str], loci: pd.DataFrame, frames: dict[Any, pd.DataFrame], omega: float) -> Group | None:
+def _first_used(loci: pd.DataFrame, pushes: pd.DataFrame) -> Array:
+    """Instant from which each locus is used [s], shape (m,): hands leave a little after the marks."""
+    ends = {trial: one["end"].to_numpy(float) for trial, one in pushes.groupby("trial", observed=True)}
+    out = loci["start"].to_numpy(float).copy()
+    for j, trial in enumerate(loci["trial"]):
+        free = ends.get(trial, np.empty(0)) + PUSH_MARGIN
+        out[j] = max([out[j], *free[(free > out[j]) & (free <= out[j] + PUSH_MARGIN + 1e-9)]])
+    return out
+
+
+def _group(key: tuple[str, str, str], loci: pd.DataFrame, start: Array, frames: dict[Any, pd.DataFrame], omega: float) -> Group | None:
     motions = {trial: _Motion.of(table) for trial, table in frames.items()}
     if not motions:
         return None
     rate = min(float(np.median([m.rate for m in motions.values()])), FASTEST)
     cut, kept, left_out, shortened = [], [], [], []
-    for _, locus in loci.iterrows():
-        piece = motions[locus["trial"]].cut(locus["start"], locus["end"], rate) if locus["trial"] in motions else None
+    for (_, locus), begin in zip(loci.iterrows(), start, strict=True):
+        piece = motions[locus["trial"]].cut(begin, locus["end"], rate) if locus["trial"] in motions else None
         if piece is None or len(piece[0]) < max(SHORTEST * rate, 8):
             left_out.append((locus, f"no unbroken CoM and ZMP of {SHORTEST} s"))
         else:
             cut.append(piece)
             kept.append(locus)
             first, last = piece[3], piece[3] + (len(piece[0]) - 1) / rate
-            whole = first <= locus["start"] + 1.5 / rate and last >= min(locus["end"], locus["start"] + HORIZON) - 1.5 / rate
+            whole = first <= begin + 1.5 / rate and last >= min(locus["end"], begin + HORIZON) - 1.5 / rate
             shortened.append("" if whole else f"a gap: only {first:.2f} to {last:.2f} s is used")
     if not cut:
         return None

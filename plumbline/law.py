@@ -22,7 +22,8 @@ from plumbline.switching import Noise, Regime
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-MATTERS = 0.02  # share of the simulated error that a delay must take off before it is called one
+SHORTEST = 0.01  # [s] a delay is one where its interval lies above this
+SHOWS = 0.02  # share of the equation error that a delay must take off before it can matter to who is at a limit
 SIMULATED = 50.0  # [Hz] of the closed loops simulated: poles of 5 1/s are integrated to 0.1 %, at 100 Hz the gains are the same
 
 
@@ -50,8 +51,13 @@ def regimes(batch: Batch, omega: float, steady: Mask) -> Regimes | None:
     noise = switching.noise(batch, least.law, least.limit_rms, least.inside_rms)
     law, regime = least.law, switching.regimes(batch, least.law, noise)
     coarse, thin = thinned(batch, regime)
-    law = output_error.fit(coarse.take(steady), thin[:, steady], switching.limits(regime, batch, law), omega).law
-    regime = switching.refine(switching.regimes(batch, law, noise), batch, law, noise)
+    coarse, thin = coarse.take(steady), thin[:, steady]
+    plain = output_error.fit(coarse, thin, switching.limits(regime, batch, law), omega)
+    delayed = output_error.search(coarse, thin, plain.law, omega, gain=SHOWS)
+    law, seen = plain.law, batch
+    if delayed is not None and _late(plain, delayed):
+        law, seen = delayed.law, batch.late(delayed.law.delay)
+    regime = switching.refine(switching.regimes(seen, law, noise), seen, law, noise)
     return Regimes(least, noise, switching.limits(regime, batch, law), regime)
 
 
@@ -79,7 +85,7 @@ class Controller:
 
     @property
     def late(self) -> bool:
-        """Whether a delay is there: its interval leaves 0 out and it lowers the simulated error by at least MATTERS."""
+        """Whether a delay is there: its interval lies above SHORTEST."""
         return _late(self.output_error, self.delayed)
 
 
@@ -87,7 +93,7 @@ def _late(plain: OutputError, delayed: OutputError | None) -> bool:
     if delayed is None:
         return False
     low = delayed.law.delay - reach(delayed.covariance[3, 3], delayed.loci)
-    return bool(low > 0 and delayed.error < (1 - MATTERS) * plain.error)
+    return bool(low > SHORTEST and delayed.error < plain.error)
 
 
 def identify(batch: Batch, regime: Regime, omega: float, steady: Mask, *, delay: bool = True) -> Controller | None:

@@ -3,8 +3,9 @@
 Reads the UNFILTERED CoM, ZMP and force. A bump that meets a push (and a margin around it), a gap or an end gives NaN.
 """
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -152,8 +153,22 @@ def pieces(good: NDArray[np.bool_], longest: int) -> NDArray[np.int64]:
     return out
 
 
+def rows_of(table: pd.DataFrame, rows: Any) -> pd.DataFrame:
+    """Rows of a table; without a copy where they follow each other, as those of a trial do."""
+    index = np.asarray(rows)
+    if len(index) and index[-1] - index[0] + 1 == len(index):
+        return table.iloc[int(index[0]) : int(index[-1]) + 1]
+    return table.iloc[index]
+
+
 def of_trials(
-    signals: pd.DataFrame, pushes: pd.DataFrame, coverage: pd.DataFrame, *, half_width: float, exponent: int
+    signals: pd.DataFrame,
+    pushes: pd.DataFrame,
+    coverage: pd.DataFrame,
+    *,
+    half_width: float,
+    exponent: int,
+    axes: Collection[str] = tuple(AXES),
 ) -> Iterator[tuple[pd.Series, pd.DataFrame, dict[str, Plant]]]:
     """The plants of every trial that has a CoM and a ZMP, one trial at a time.
 
@@ -165,12 +180,12 @@ def of_trials(
         index = rows.get(about["trial"])
         if index is None or about["com_method"] == "none":
             continue
-        frames = signals.iloc[index]
+        frames = rows_of(signals, index)
         rate = sampling_rate(frames["time"].to_numpy())
         if not half_width * rate >= SAMPLES:
             continue
         bump = Bump(half_width, exponent, rate)
         pushed = by_trial.get(about["trial"], pushes.iloc[:0])
         known = not about["filtered_before"] and about["com_method"] != "force"
-        plants = {a: plant(frames, pushed, about["mass"], a, bump, known) for a in AXES}
+        plants = {a: plant(frames, pushed, about["mass"], a, bump, known) for a in axes}
         yield about, frames, {a: p for a, p in plants.items() if len(p.picked) >= 3}

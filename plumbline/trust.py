@@ -25,7 +25,7 @@ from plumbline.batch import Batch
 from plumbline.clusters import group_windows, plant_of
 from plumbline.groups import Group, of_loci
 from plumbline.models.controller import Law
-from plumbline.plant import SIGNALS
+from plumbline.plant import SIGNALS, rows_of
 from plumbline.switching import Noise, Regime
 
 Array = NDArray[np.float64]
@@ -62,7 +62,7 @@ def of_part(
     plants = {key: plant_of(weak) for key, weak in of_group.items()}
     omega = {key: plant.omega for key, plant in plants.items() if plant is not None and plant.w2 > 0}
     parts, traces = [], []
-    for group in of_loci(signals, loci, omega):
+    for group in of_loci(signals, pushes, loci, omega):
         found = laws.regimes(group.batch, omega[(group.subject, group.task, group.condition)], group.steady)
         if found is None:
             continue
@@ -237,7 +237,7 @@ def _filtered(group: Group, signals: pd.DataFrame, offset: float) -> tuple[Array
     out = np.zeros((2, len(batch.x) - batch.lead, len(length)))
     rows = signals.groupby("trial", sort=False, observed=True).indices
     for j, trial in enumerate(group.loci["trial"]):
-        table = signals.iloc[rows[trial]]
+        table = rows_of(signals, rows[trial])
         time = group.starts[j] + np.arange(length[j]) / batch.rate
         a = np.interp(time, table["time"], table["com_ddot_x"])
         lever = np.interp(time, table["time"], table["com_lp_x"] - table["zmp_lp_x"]) - offset

@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 
 FAR = 0.5  # [m] a simulated CoM that strays further is held there
 ROUNDS = 40
+SETTLED = 1e-5  # share of the cost that a full step promises, below which the search has settled
 STEPS = np.array([1e-5, 1e-3, 1e-3, 2e-3])  # of d, k1, k2, delay for the derivatives
 LONGEST = 0.9 * LEAD  # [s]
 GRID = 0.02  # [s] between the delays that a first guess is chosen from
@@ -54,13 +55,19 @@ def fit(batch: Batch, regime: Regime, start: Law, omega: float, *, delayed: bool
     for _ in range(ROUNDS):
         normal = np.einsum("inm,jnm->ij", slopes, slopes)
         downhill = np.einsum("inm,nm->i", slopes, error)
+        free = np.ones(count, bool)
+        free[3:] = theta[3] > 0 or downhill[3:] < 0  # a delay at 0 that wants to be negative stays there
+        kept, now = np.ix_(free, free), float(np.sum(error**2))
+        if downhill[free] @ np.linalg.lstsq(normal[kept], downhill[free], rcond=None)[0] < SETTLED * now:
+            converged = True
+            break
         tries = damp * np.array([0.01, 1.0, 100.0])
         points = np.stack([theta] * 3, axis=1)
         for k, much in enumerate(tries):
-            points[:count, k] -= np.linalg.solve(normal + much * np.diag(np.diag(normal) + 1e-12), downhill)
+            points[:count][free, k] -= np.linalg.solve(normal[kept] + much * np.diag(np.diag(normal[kept]) + 1e-12), downhill[free])
         points[3] = np.clip(points[3], 0.0, LONGEST)
         cost = np.sum(simulate(points, batch, regime, omega, limits) ** 2, axis=(0, 2))
-        best, now = int(np.argmin(cost)), float(np.sum(error**2))
+        best = int(np.argmin(cost))
         if cost[best] >= now * (1 - 1e-9):
             damp *= 1e3
             if damp > 1e9:  # no step is better: this is the minimum
@@ -69,24 +76,33 @@ def fit(batch: Batch, regime: Regime, start: Law, omega: float, *, delayed: bool
             continue
         theta, damp = points[:, best], max(tries[best], 1e-9)
         error, slopes = _derivatives(theta, count, batch, regime, omega, limits)
-        if cost[best] >= now * (1 - 1e-5):
-            converged = True
-            break
     return _certified(theta, limits, error, slopes, batch, converged)
 
 
-def search(batch: Batch, regime: Regime, start: Law, omega: float) -> OutputError:
+def search(batch: Batch, regime: Regime, start: Law, omega: float, *, gain: float = 0.0) -> OutputError | None:
     """Fit with a delay, from two first guesses: the cost has more than one valley.
 
     The guesses are no delay and the one with the least equation error. The latter sees a delay nearly everywhere (feedback noise is
-    older than the state it moves), so it only starts the search.
+    older than the state it moves), so it only starts the search.  gain: share of the equation error that a delay must take off for the
+    search to begin at all; None where it does not.
     """
-    late = [(g, saturation.fit(batch.late(g))) for g in np.arange(0.0, LONGEST, GRID)]
-    fitted = [(got.cost, got.law._replace(delay=float(g))) for g, got in late if got is not None]
-    guesses = [start]
-    if fitted:
-        guesses.append(min(fitted, key=lambda one: one[0])[1]._replace(left=start.left, right=start.right))
-    return min((fit(batch, regime, guess, omega, delayed=True) for guess in guesses), key=lambda one: one.error)
+    inside = batch.inside & (regime == 0)
+    late = [(float(g), *_equation_error(batch.late(float(g)), inside)) for g in np.arange(0.0, LONGEST, GRID)]
+    delay, cost, d, k1, k2 = min(late, key=lambda one: one[1])
+    if not cost <= (1 - gain) * late[0][1]:
+        return None
+    guesses = [start, start._replace(d=d, k1=k1, k2=k2, delay=delay)] if np.isfinite(cost) else [start]
+    return min((fit(batch, regime, one, omega, delayed=True) for one in guesses), key=lambda one: one.error)
+
+
+def _equation_error(batch: Batch, inside: NDArray[np.bool_]) -> tuple[float, float, float, float]:
+    """Sum of squares of p - law over the frames inside the limits, and the law's d, k1, k2; infinite where it cannot be told."""
+    x, v, p = batch.x[inside], batch.v[inside], batch.p[inside]
+    solved = saturation.linear(x, v, p)
+    if solved is None or abs(solved[1] - 1) < 1e-6:
+        return np.inf, 0.0, 0.0, 0.0
+    c, k1, k2 = solved
+    return float(np.sum((p - c - k1 * x - k2 * v) ** 2)), c / (1 - k1), k1, k2
 
 
 def _derivatives(theta: Array, count: int, batch: Batch, regime: Regime, omega: float, limits: tuple[float, float]) -> tuple[Array, Array]:
@@ -110,26 +126,25 @@ def simulate(points: Array, batch: Batch, regime: Regime, omega: float, limits: 
     points: (4, k) with d [m], k1 [1], k2 [s], delay [s].  limits: left and right [m].  Returns [m], shape (n, k, m), 0 outside loci.
     The plant is integrated exactly for a ZMP that is linear between frames.
     """
-    d, k1, k2, delay = (row[:, None] for row in points)
+    k1, k2 = points[1, :, None], points[2, :, None]
     (n, m), k = batch.x.shape, points.shape[1]
-    dx, dv = np.zeros((n, k, m)), np.zeros((n, k, m))
-    back = delay[:, 0] * batch.rate
+    asked = _asked(points, batch)
+    dx, dv, reply = np.zeros((n, k, m)), np.zeros((n, k, m)), np.zeros((n, k, m))  # reply: k1 dx + k2 dv
+    back = points[3] * batch.rate
     whole = np.floor(back + 1e-9).astype(int)
-    part, which, late = (back - whole)[:, None], np.arange(k), bool(np.any(back > 1e-9))
-    constant, left, right = (1 - k1) * d, *limits
+    part, which, late, fresh = (back - whole)[:, None], np.arange(k), bool(np.any(back > 1e-9)), (whole == 0)[:, None]
+    (left, right), at_left, at_right = limits, regime < 0, regime > 0
 
-    def dp(row: int, x: Array, v: Array) -> Array:
-        """Law minus measured ZMP at a row whose deviation is x, v."""
+    def dp(row: int, now: Array) -> Array:
+        """Law minus measured ZMP at a row whose own reply is `now`."""
         if late:
-            now, then = np.maximum(row - whole, 0), np.maximum(row - whole - 1, 0)
-            fresh = (whole == 0)[:, None]
-            x = (1 - part) * (batch.x[now] + np.where(fresh, x, dx[now, which])) + part * (batch.x[then] + dx[then, which])
-            v = (1 - part) * (batch.v[now] + np.where(fresh, v, dv[now, which])) + part * (batch.v[then] + dv[then, which])
-        else:
-            x, v = batch.x[row] + x, batch.v[row] + v
-        wanted = constant + k1 * x + k2 * v
-        both = ((wanted >= right) & (regime[row] > 0)) | ((wanted <= left) & (regime[row] < 0))
-        return np.where(both, 0.0, np.clip(wanted, left, right) - batch.p[row])
+            then = np.where(fresh, now, reply[np.maximum(row - whole, 0), which])
+            now = then + part * (reply[np.maximum(row - whole - 1, 0), which] - then)
+        wanted = asked[row] + now
+        both = ((wanted >= right) & at_right[row]) | ((wanted <= left) & at_left[row])
+        out = np.minimum(np.maximum(wanted, left), right) - batch.p[row]
+        out[both] = 0.0
+        return np.asarray(out)
 
     t = omega / batch.rate
     c, s = np.cosh(t), np.sinh(t)
@@ -138,9 +153,21 @@ def simulate(points: Array, batch: Batch, regime: Regime, omega: float, limits: 
         if not alive.any():
             break
         x, v = dx[row], dv[row]
-        a = dp(row, x, v)
+        a = dp(row, reply[row])
         x, v = c * x + s / omega * v - (c - 1) * a, omega * s * x + c * v - omega * s * a
-        rise = dp(row + 1, x, v) - a
-        dx[row + 1] = np.where(alive, np.clip(x - (s / t - 1) * rise, -FAR, FAR), 0.0)
-        dv[row + 1] = np.where(alive, v - omega * (c - 1) / t * rise, 0.0)
+        rise = dp(row + 1, k1 * x + k2 * v) - a
+        dx[row + 1] = np.minimum(np.maximum(x - (s / t - 1) * rise, -FAR), FAR) * alive
+        dv[row + 1] = (v - omega * (c - 1) / t * rise) * alive
+        reply[row + 1] = k1 * dx[row + 1] + k2 * dv[row + 1]
     return dx
+
+
+def _asked(points: Array, batch: Batch) -> Array:
+    """What each law asks for on the measured motion, before the limits [m], (n, k, m)."""
+    d, k1, k2, delay = points
+    row = np.maximum(np.arange(len(batch.x))[:, None] - delay * batch.rate, 0.0)
+    now = np.floor(row + 1e-9).astype(int)
+    part = (row - now)[:, :, None]
+    after = np.minimum(now + 1, len(batch.x) - 1)
+    x, v = (one[now] + part * (one[after] - one[now]) for one in (batch.x, batch.v))
+    return np.asarray(((1 - k1) * d)[:, None] + k1[:, None] * x + k2[:, None] * v)

@@ -52,15 +52,15 @@ def fit(batch: Batch) -> Saturation | None:
 
 
 def _alternate(x: Array, v: Array, p: Array, left: float, right: float, enough: int) -> Law | None:
-    a = np.column_stack([np.ones(len(x)), x, v])
     margin = 0.05 * (right - left) if np.isfinite(right - left) else 0.0
     inside = (p > left + margin) & (p < right - margin) if margin else np.ones(len(p), bool)
     law = None
     for _ in range(ROUNDS):
-        if inside.sum() < 20 or np.linalg.cond(a[inside]) > 1e8:
+        solved = linear(x[inside], v[inside], p[inside])
+        if solved is None:
             return law
-        c, k1, k2 = np.linalg.lstsq(a[inside], p[inside], rcond=None)[0]
-        wanted = a @ [c, k1, k2]
+        c, k1, k2 = solved
+        wanted = c + k1 * x + k2 * v
         left = _limit(p, wanted <= left, enough, -1)
         right = _limit(p, wanted >= right, enough, +1)
         law = Law(_reference(c, k1), k1, k2, left, right)
@@ -69,6 +69,22 @@ def _alternate(x: Array, v: Array, p: Array, left: float, right: float, enough: 
             break
         inside = again
     return law
+
+
+def linear(x: Array, v: Array, p: Array) -> tuple[float, float, float] | None:
+    """Least squares of p = c + k1 x + k2 x': (c [m], k1 [1], k2 [s]); None where fewer than 20 frames, or x and x' cannot be told apart.
+
+    x, v, p: (n,).  Centred and scaled normal equations: their condition is that of the correlation of x with x'.
+    """
+    if len(p) < 20:
+        return None
+    middle = np.array([x.mean(), v.mean(), p.mean()])
+    a, b, y = x - middle[0], v - middle[1], p - middle[2]
+    size = np.sqrt([a @ a, b @ b])
+    if size.min() <= 1e-9 * np.sqrt(len(p)) or 1 - (a @ b / size.prod()) ** 2 < 1e-6:
+        return None
+    k1, k2 = np.linalg.solve([[a @ a, a @ b], [a @ b, b @ b]], [a @ y, b @ y])
+    return float(middle[2] - k1 * middle[0] - k2 * middle[1]), float(k1), float(k2)
 
 
 def _reference(c: float, k1: float) -> float:
