@@ -93,7 +93,7 @@ def _late(plain: OutputError, delayed: OutputError | None) -> bool:
     if delayed is None:
         return False
     low = delayed.law.delay - reach(delayed.covariance[3, 3], delayed.loci)
-    return bool(low > SHORTEST and delayed.error < plain.error)
+    return bool(low > SHORTEST and delayed.misfit < plain.misfit)
 
 
 def identify(batch: Batch, regime: Regime, omega: float, steady: Mask, *, delay: bool = True) -> Controller | None:

@@ -5,7 +5,6 @@ import pytest
 from made_loci import PUBLISHED, batched, made, switch_errors
 
 from plumbline import law as laws
-from plumbline.estimators.clustered import reach
 
 LIMITS = [(-0.1, 0.1), (-0.09, 0.13)]
 
@@ -75,19 +74,22 @@ def test_ten_millimetres_of_feedback_noise() -> None:
 
 @pytest.mark.parametrize(("name", "delay"), [("A", 0.06), ("B", 0.1)])
 def test_a_neural_delay_is_found(name: str, delay: float) -> None:
-    """Within 10 ms, inside its interval; k1 is off by more than 15 % without it and less than 5 % with it."""
-    loci = made(name, 5, delay=delay)
-    b, omega, steady = batched(loci, PUBLISHED[name]["omega"]), PUBLISHED[name]["omega"], np.ones(len(loci), bool)
-    found = laws.regimes(b, omega, steady)
-    assert found is not None
-    got = laws.identify(b, found.regime, omega, steady)
-    assert got is not None
-    assert got.late
-    assert got.delayed is not None
-    assert got.delayed.law.delay == pytest.approx(delay, abs=0.01)
-    assert abs(got.output_error.law.k1 / PUBLISHED[name]["k1"] - 1) > 0.15
-    assert abs(got.delayed.law.k1 / PUBLISHED[name]["k1"] - 1) < 0.05
-    assert abs(got.delayed.law.delay - delay) < 2 * reach(got.delayed.covariance[3, 3], got.delayed.loci)
+    """Mean of three studies: within 10 ms in each; k1 is off by more than 15 % without the delay and by less than 3 % with it."""
+    errors = []
+    for seed in (5, 6, 7):
+        loci = made(name, seed, delay=delay)
+        b, omega, steady = batched(loci, PUBLISHED[name]["omega"]), PUBLISHED[name]["omega"], np.ones(len(loci), bool)
+        found = laws.regimes(b, omega, steady)
+        assert found is not None
+        got = laws.identify(b, found.regime, omega, steady)
+        assert got is not None
+        assert got.late
+        assert got.delayed is not None
+        assert got.delayed.law.delay == pytest.approx(delay, abs=0.01)
+        errors.append([law.k1 / PUBLISHED[name]["k1"] - 1 for law in (got.output_error.law, got.delayed.law)])
+    without, with_it = np.mean(errors, axis=0)
+    assert abs(without) > 0.15
+    assert abs(with_it) < 0.03
 
 
 def test_mirrored_loci_give_a_mirrored_law() -> None:

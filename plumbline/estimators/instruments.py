@@ -37,7 +37,7 @@ def fit(batch: Batch, regime: Regime, start: Law, omega: float, feedback_sd: flo
     start: its delay is kept.  feedback_sd: rms of p - law inside [m].  None where fewer than 20 frames are well inside.
     """
     point = np.array([[start.d], [start.k1], [start.k2], [start.delay]])
-    dx = output_error.simulate(point, batch, regime, omega, (start.left, start.right))[:, 0]
+    dx = output_error.simulate(point, batch, regime, omega, (start.left, start.right))[0, :, 0]
     seen = batch.late(start.delay)
     free = replace(batch, x=batch.x + dx, v=batch.v + np.gradient(dx, 1 / batch.rate, axis=0)).late(start.delay)
     wanted = start.wanted(free.x, free.v)

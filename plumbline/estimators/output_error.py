@@ -6,9 +6,13 @@ Only the deviation from the measured motion is simulated, so that nothing the pl
     \delta p = \mathrm{clip}\bigl(\mathrm{law}(x + \delta x,\, \dot x + \delta\dot x)\bigr) - p,
 
 from rest at the start of each locus (no start state is fitted), state taken `delay` earlier. Where law and measured ZMP are both at
-the same limit :math:`\delta p = 0`: half a millimetre of a limit would grow as e^(wt). The sum of squares of :math:`\delta x` is
-minimised (Levenberg 1944, Marquardt 1963). Feedback noise reaches :math:`\delta x` but not the simulated regressors: unlike least
-squares the estimate is consistent (Ljung 1999, section 7.3). Intervals: sandwich clustered by locus.
+the same limit :math:`\delta p = 0`: half a millimetre of a limit would grow as e^(wt). The outputs are the CoM and the ZMP,
+
+.. math:: \min \sum (\delta x/\sigma_x)^2 + (\delta p/\sigma_p)^2,
+
+each in its own rms (Levenberg 1944, Marquardt 1963): the CoM alone hardly tells a delay from larger gains, the ZMP shows when the law
+acts. Feedback noise reaches the outputs but not the simulated regressors: unlike least squares the estimate is consistent
+(Ljung 1999, section 7.3). Intervals: sandwich clustered by locus.
 """
 
 from typing import NamedTuple
@@ -33,11 +37,13 @@ GRID = 0.02  # [s] between the delays that a first guess is chosen from
 
 
 class OutputError(NamedTuple):
-    """law with the delay; covariance of (d, k1, k2[, delay]); rms of the simulated against the measured CoM [m]; loci; converged."""
+    """law with the delay; covariance of (d, k1, k2[, delay]); rms of the simulated against the measured CoM [m]; rms of CoM times rms
+    of ZMP [m2], by which fits compare (the determinant criterion, Ljung 1999); loci; converged."""
 
     law: Law
     covariance: Array
     error: float
+    misfit: float
     loci: int
     converged: bool
 
@@ -47,14 +53,31 @@ def fit(batch: Batch, regime: Regime, start: Law, omega: float, *, delayed: bool
 
     batch: loci; regime: (n, m) of its frames; omega: of the plant [rad/s].  start: where the search begins.
     """
-    count = 4 if delayed else 3
     theta = np.array([start.d, start.k1, start.k2, start.delay])
     limits = (start.left, start.right)
+    count = 4 if delayed else 3
+    scale = _scale(simulate(theta[:, None], batch, regime, omega, limits)[:, :, 0], batch)
+    theta, converged = _descend(theta, count, scale, batch, regime, omega, limits)
+    scale = _scale(simulate(theta[:, None], batch, regime, omega, limits)[:, :, 0], batch)
+    theta, converged = _descend(theta, count, scale, batch, regime, omega, limits)
+    return _certified(theta, count, scale, batch, regime, omega, limits, converged)
+
+
+def _scale(outputs: Array, batch: Batch) -> Array:
+    """Rms of dx and dp over the frames of the loci [m], shape (2, 1, 1)."""
+    rms = np.sqrt(np.sum(outputs**2, axis=(1, 2)) / batch.inside.sum())
+    return np.asarray(np.maximum(rms, 1e-9)[:, None, None])
+
+
+def _descend(
+    theta: Array, count: int, scale: Array, batch: Batch, regime: Regime, omega: float, limits: tuple[float, float]
+) -> tuple[Array, bool]:
+    """Levenberg-Marquardt from theta (4,), of which the first `count` are free; the minimum and whether the search settled."""
     damp, converged = 1e-3, False
-    error, slopes = _derivatives(theta, count, batch, regime, omega, limits)
+    error, slopes = _derivatives(theta, count, scale, batch, regime, omega, limits)
     for _ in range(ROUNDS):
-        normal = np.einsum("inm,jnm->ij", slopes, slopes)
-        downhill = np.einsum("inm,nm->i", slopes, error)
+        normal = np.einsum("iynm,jynm->ij", slopes, slopes)
+        downhill = np.einsum("iynm,ynm->i", slopes, error)
         free = np.ones(count, bool)
         free[3:] = theta[3] > 0 or downhill[3:] < 0  # a delay at 0 that wants to be negative stays there
         kept, now = np.ix_(free, free), float(np.sum(error**2))
@@ -66,7 +89,7 @@ def fit(batch: Batch, regime: Regime, start: Law, omega: float, *, delayed: bool
         for k, much in enumerate(tries):
             points[:count][free, k] -= np.linalg.solve(normal[kept] + much * np.diag(np.diag(normal[kept]) + 1e-12), downhill[free])
         points[3] = np.clip(points[3], 0.0, LONGEST)
-        cost = np.sum(simulate(points, batch, regime, omega, limits) ** 2, axis=(0, 2))
+        cost = np.sum((simulate(points, batch, regime, omega, limits) / scale[..., None]) ** 2, axis=(0, 1, 3))
         best = int(np.argmin(cost))
         if cost[best] >= now * (1 - 1e-9):
             damp *= 1e3
@@ -75,8 +98,8 @@ def fit(batch: Batch, regime: Regime, start: Law, omega: float, *, delayed: bool
                 break
             continue
         theta, damp = points[:, best], max(tries[best], 1e-9)
-        error, slopes = _derivatives(theta, count, batch, regime, omega, limits)
-    return _certified(theta, limits, error, slopes, batch, converged)
+        error, slopes = _derivatives(theta, count, scale, batch, regime, omega, limits)
+    return theta, converged
 
 
 def search(batch: Batch, regime: Regime, start: Law, omega: float, *, gain: float = 0.0) -> OutputError | None:
@@ -92,7 +115,7 @@ def search(batch: Batch, regime: Regime, start: Law, omega: float, *, gain: floa
     if not cost <= (1 - gain) * late[0][1]:
         return None
     guesses = [start, start._replace(d=d, k1=k1, k2=k2, delay=delay)] if np.isfinite(cost) else [start]
-    return min((fit(batch, regime, one, omega, delayed=True) for one in guesses), key=lambda one: one.error)
+    return min((fit(batch, regime, one, omega, delayed=True) for one in guesses), key=lambda one: one.misfit)
 
 
 def _equation_error(batch: Batch, inside: NDArray[np.bool_]) -> tuple[float, float, float, float]:
@@ -105,31 +128,38 @@ def _equation_error(batch: Batch, inside: NDArray[np.bool_]) -> tuple[float, flo
     return float(np.sum((p - c - k1 * x - k2 * v) ** 2)), c / (1 - k1), k1, k2
 
 
-def _derivatives(theta: Array, count: int, batch: Batch, regime: Regime, omega: float, limits: tuple[float, float]) -> tuple[Array, Array]:
-    """Simulated minus measured CoM (n, m) and its derivatives (count, n, m)."""
+def _derivatives(
+    theta: Array, count: int, scale: Array, batch: Batch, regime: Regime, omega: float, limits: tuple[float, float]
+) -> tuple[Array, Array]:
+    """Scaled outputs (2, n, m) and their derivatives (count, 2, n, m)."""
     points = np.column_stack([theta] + [theta + STEPS * (np.arange(4) == j) for j in range(count)])
-    dx = simulate(points, batch, regime, omega, limits)
-    return dx[:, 0], np.stack([(dx[:, 1 + j] - dx[:, 0]) / STEPS[j] for j in range(count)])
+    outputs = simulate(points, batch, regime, omega, limits) / scale[..., None]
+    return outputs[:, :, 0], np.stack([(outputs[:, :, 1 + j] - outputs[:, :, 0]) / STEPS[j] for j in range(count)])
 
 
-def _certified(theta: Array, limits: tuple[float, float], error: Array, slopes: Array, batch: Batch, converged: bool) -> OutputError:
-    bread = np.linalg.pinv(np.einsum("inm,jnm->ij", slopes, slopes))
-    scores = np.einsum("inm,nm->mi", slopes, error)
+def _certified(
+    theta: Array, count: int, scale: Array, batch: Batch, regime: Regime, omega: float, limits: tuple[float, float], converged: bool
+) -> OutputError:
+    error, slopes = _derivatives(theta, count, scale, batch, regime, omega, limits)
+    bread = np.linalg.pinv(np.einsum("iynm,jynm->ij", slopes, slopes))
+    scores = np.einsum("iynm,ynm->mi", slopes, error)
     law = Law(float(theta[0]), float(theta[1]), float(theta[2]), *limits, delay=float(theta[3]))
-    rms = float(np.sqrt(np.sum(error**2) / batch.inside.sum()))
-    return OutputError(law, sandwich(bread, scores), rms, error.shape[1], converged)
+    size = float(np.sqrt(np.sum(error[0] ** 2) / batch.inside.sum()) * scale[0, 0, 0])
+    fit = float(np.prod(scale))
+    return OutputError(law, sandwich(bread, scores), size, fit, error.shape[2], converged)
 
 
 def simulate(points: Array, batch: Batch, regime: Regime, omega: float, limits: tuple[float, float]) -> Array:
-    """Deviation of the simulated from the measured CoM for several laws at once.
+    """Simulated minus measured CoM and ZMP for several laws at once.
 
-    points: (4, k) with d [m], k1 [1], k2 [s], delay [s].  limits: left and right [m].  Returns [m], shape (n, k, m), 0 outside loci.
+    points: (4, k) with d [m], k1 [1], k2 [s], delay [s].  limits: left and right [m].
+    Returns dx and dp [m], shape (2, n, k, m), 0 outside loci.
     The plant is integrated exactly for a ZMP that is linear between frames.
     """
     k1, k2 = points[1, :, None], points[2, :, None]
     (n, m), k = batch.x.shape, points.shape[1]
     asked = _asked(points, batch)
-    dx, dv, reply = np.zeros((n, k, m)), np.zeros((n, k, m)), np.zeros((n, k, m))  # reply: k1 dx + k2 dv
+    dx, dv, reply, out = (np.zeros((n, k, m)) for _ in range(4))  # reply: k1 dx + k2 dv
     back = points[3] * batch.rate
     whole = np.floor(back + 1e-9).astype(int)
     part, which, late, fresh = (back - whole)[:, None], np.arange(k), bool(np.any(back > 1e-9)), (whole == 0)[:, None]
@@ -142,9 +172,9 @@ def simulate(points: Array, batch: Batch, regime: Regime, omega: float, limits: 
             now = then + part * (reply[np.maximum(row - whole - 1, 0), which] - then)
         wanted = asked[row] + now
         both = ((wanted >= right) & at_right[row]) | ((wanted <= left) & at_left[row])
-        out = np.minimum(np.maximum(wanted, left), right) - batch.p[row]
-        out[both] = 0.0
-        return np.asarray(out)
+        clipped = np.minimum(np.maximum(wanted, left), right) - batch.p[row]
+        clipped[both] = 0.0
+        return np.asarray(clipped)
 
     t = omega / batch.rate
     c, s = np.cosh(t), np.sinh(t)
@@ -154,12 +184,13 @@ def simulate(points: Array, batch: Batch, regime: Regime, omega: float, limits: 
             break
         x, v = dx[row], dv[row]
         a = dp(row, reply[row])
+        out[row] = a * alive
         x, v = c * x + s / omega * v - (c - 1) * a, omega * s * x + c * v - omega * s * a
         rise = dp(row + 1, k1 * x + k2 * v) - a
         dx[row + 1] = np.minimum(np.maximum(x - (s / t - 1) * rise, -FAR), FAR) * alive
         dv[row + 1] = (v - omega * (c - 1) / t * rise) * alive
         reply[row + 1] = k1 * dx[row + 1] + k2 * dv[row + 1]
-    return dx
+    return np.stack([dx, out])
 
 
 def _asked(points: Array, batch: Batch) -> Array:
