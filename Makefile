@@ -20,8 +20,8 @@ test: ## run the tests
 check: ## lint, format, types, rules
 	@$(PYTHON) -m plumbline check
 
-bench: setup ## benchmarks
-	@echo "make bench: no benchmark yet; the first come with the controller's identification"
+bench: setup ## benchmarks, against other libraries where there are any
+	@.venv/bin/python -m benchmarks
 
 papers: ## compare results with the committed references
 	@$(PYTHON) -m plumbline papers

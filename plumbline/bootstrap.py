@@ -112,7 +112,7 @@ def test(arguments: list[str]) -> int:
 
 def check(arguments: list[str]) -> int:
     """Lint, format, types, rules: all are run, the worst exit code counts."""
-    rules = ["Snakefile", *map(str, sorted((REPO / "workflow" / "rules").glob("*.smk")))]
+    rules = ["Snakefile", *map(str, sorted([*REPO.glob("workflow/rules/*.smk"), *REPO.glob("studies/*/paper.smk")]))]
     jobs = [
         ("ruff", "check", "."),
         ("ruff", "format", "--check", "."),

@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 Key = tuple[str, str, str]
 
 FEWEST = 3  # loci behind gains
+SURE = 0.95  # [1] share of a cluster from which on a locus counts in its omega and gains: a short fall has a wide se, but a long lever
 REGIMES = {"left": -1, "inside": 0, "right": 1}
 
 
@@ -113,12 +114,16 @@ def _alone(locus: pd.Series, weak: Windows | None) -> dict[str, Any]:
     inside = weak.locus == locus["locus"]
     far = np.abs(weak.plant.x[inside] - locus["reference"])
     row["reach"] = float(np.nanmax(far)) if np.isfinite(far).any() else nan
-    got = solve([(weak, weak.picked[weak.locus[weak.picked] == locus["locus"]])], blocks=True)
+    picked = weak.picked[weak.locus[weak.picked] == locus["locus"]]
+    got = solve([(weak, picked)], blocks=True)
     if got is None:
         return row
-    low, high = got.omega_interval()
-    widen = float(stdtrit(max(got.dof, 1), 0.975)) / 1.96  # few blocks: their scatter is itself uncertain
-    se = float(np.sqrt(got.covariance[0, 0])) * widen
+    se = weak.plant.w2_se(picked, got.w2)
+    if np.isfinite(se):
+        low, high = (float(np.sqrt(max(got.w2 + sign * 1.96 * se, 0.0))) for sign in (-1, 1))
+    else:  # noise not known: the scatter of the locus' blocks, few and so uncertain themselves
+        low, high = got.omega_interval()
+        se = float(np.sqrt(got.covariance[0, 0])) * float(stdtrit(max(got.dof, 1), 0.975)) / 1.96
     row |= {"omega": got.omega, "omega_low": low, "omega_high": high, "w2": got.w2, "w2_se": se}
     return row | {"note": "" if got.w2 > 0 else "w2 is not positive"}
 
@@ -139,6 +144,8 @@ def _controllers(
     numbers = sorted(set(table["cluster"]) - {0})
     for cluster in numbers if len(numbers) > 1 else [0]:  # gains over loci of several omegas are nobody's
         mine = table if cluster == 0 else table[table["cluster"] == cluster]
+        sure = mine[mine["share"] >= SURE]
+        mine = sure if len(sure) >= FEWEST else mine
         plant = plant_of(weak, set(zip(mine["trial"], mine["locus"], strict=True)))
         if plant is None or plant.w2 <= 0:
             yield _blank(about | {"cluster": cluster}) | {"warning": "omega cannot be told from these loci, so neither can the gains"}
@@ -154,6 +161,7 @@ def _note(table: pd.DataFrame, group: Group | None) -> None:
     """Say of each locus whether it was used for the gains."""
     table.loc[table["kind"] == "falling", "note"] = "falls: its ZMP only shows the limit"
     if group is None:
+        table.loc[table["note"] == "", "note"] = "no locus of its group has an unbroken CoM and ZMP"
         return
     steady = group.loci[group.steady]
     used = set(zip(steady["trial"], steady["locus"], strict=True))
@@ -218,7 +226,7 @@ def _gains(law: Law, covariance: Array, loci: int, omega: float) -> dict[str, An
     for k, name in enumerate(names):
         value, half = law[5 if name == "delay" else k], reach(covariance[k, k], loci)
         row |= {name: value, f"{name}_low": max(value - half, 0.0) if name == "delay" else value - half, f"{name}_high": value + half}
-    q1, q2 = poles(law.k1, law.k2, omega)
+    q1, q2 = poles(law.k1, law.k2, omega) if law.delay == 0 else (complex("nan+nanj"),) * 2
     return row | {"q1_real": q1.real, "q1_imag": q1.imag, "q2_real": q2.real, "q2_imag": q2.imag}
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from plumbline import switching
 from plumbline.batch import Batch
 from plumbline.estimators import instruments, output_error, saturation
-from plumbline.estimators.clustered import reach, sandwich
+from plumbline.estimators.clustered import jackknife, reach
 from plumbline.estimators.instruments import Instruments
 from plumbline.estimators.output_error import OutputError
 from plumbline.estimators.saturation import Saturation
@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 SHORTEST = 0.01  # [s] a delay is one where its interval lies above this
+MATTERS = 0.01  # share of the misfit of CoM and ZMP that it must take off
 SHOWS = 0.02  # share of the equation error that a delay must take off before it can matter to who is at a limit
 SIMULATED = 50.0  # [Hz] of the closed loops simulated: poles of 5 1/s are integrated to 0.1 %, at 100 Hz the gains are the same
 
@@ -45,20 +46,40 @@ def regimes(batch: Batch, omega: float, steady: Mask) -> Regimes | None:
 
     steady: (m,) loci that do not fall; the others show limits, and a simulated fall runs away.  None where the gains cannot be told.
     """
-    least = saturation.fit(batch)
-    if least is None or not np.isfinite(least.law.d) or not steady.any():
+    first, delay = _first(batch)
+    if first is None or not np.isfinite(first.law.d) or not steady.any():
         return None
-    noise = switching.noise(batch, least.law, least.limit_rms, least.inside_rms)
-    law, regime = least.law, switching.regimes(batch, least.law, noise)
+    seen = batch.late(delay)
+    noise = switching.noise(seen, first.law, first.limit_rms, first.inside_rms)
+    regime = switching.regimes(seen, first.law, noise)
+    law = switching.limits(regime, batch, first.law)
     coarse, thin = thinned(batch, regime)
     coarse, thin = coarse.take(steady), thin[:, steady]
-    plain = output_error.fit(coarse, thin, switching.limits(regime, batch, law), omega)
-    delayed = output_error.search(coarse, thin, plain.law, omega, gain=SHOWS)
-    law, seen = plain.law, batch
+    plain = output_error.fit(coarse, thin, law, omega)
+    delayed = output_error.search(coarse, thin, plain.law, omega) if delay > 0 else None
     if delayed is not None and _late(plain, delayed):
         law, seen = delayed.law, batch.late(delayed.law.delay)
+    else:
+        law, seen = plain.law, batch
     regime = switching.refine(switching.regimes(seen, law, noise), seen, law, noise)
-    return Regimes(least, noise, switching.limits(regime, batch, law), regime)
+    least = first if delay == 0 else saturation.fit(batch)
+    if least is None:
+        return None
+    known = switching.noise(batch, least.law, least.limit_rms, least.inside_rms)
+    return Regimes(least, known, switching.limits(regime, batch, law), regime)
+
+
+def _first(batch: Batch) -> tuple[Saturation | None, float]:
+    """Joint least squares at the delay that explains the ZMP best frame by frame, and that delay [s]; 0 unless it takes SHOWS off.
+
+    Equation error sees a delay nearly everywhere; to tell who is at a limit it does not matter whether it is one.
+    """
+    coarse = batch.thinned(SIMULATED)
+    fits = [(float(g), saturation.fit(coarse.late(float(g)))) for g in np.arange(0.0, output_error.LONGEST, output_error.GRID)]
+    cost = [got.cost if got is not None else np.inf for _, got in fits]
+    best = int(np.argmin(cost))
+    delay = fits[best][0] if cost[best] < (1 - SHOWS) * cost[0] else 0.0
+    return saturation.fit(batch.late(delay)), delay
 
 
 def thinned(batch: Batch, regime: Regime) -> tuple[Batch, Regime]:
@@ -85,7 +106,7 @@ class Controller:
 
     @property
     def late(self) -> bool:
-        """Whether a delay is there: its interval lies above SHORTEST."""
+        """Whether a delay is there: its interval lies above SHORTEST and it takes MATTERS off the misfit."""
         return _late(self.output_error, self.delayed)
 
 
@@ -93,7 +114,7 @@ def _late(plain: OutputError, delayed: OutputError | None) -> bool:
     if delayed is None:
         return False
     low = delayed.law.delay - reach(delayed.covariance[3, 3], delayed.loci)
-    return bool(low > SHORTEST and delayed.misfit < plain.misfit)
+    return bool(low > SHORTEST and delayed.misfit < (1 - MATTERS) * plain.misfit)
 
 
 def identify(batch: Batch, regime: Regime, omega: float, steady: Mask, *, delay: bool = True) -> Controller | None:
@@ -127,4 +148,5 @@ def _limit_se(batch: Batch, regime: Regime, side: int, limit: float) -> tuple[fl
     if not loci.any():
         return float("nan"), 0
     scores = np.where(at, batch.p - limit, 0.0).sum(0)[loci, None]
-    return float(np.sqrt(sandwich(np.array([[1 / at.sum()]]), scores)[0, 0])), int(loci.sum())
+    normals = at.sum(0)[loci, None, None].astype(float)
+    return float(np.sqrt(jackknife(normals, scores)[0, 0])), int(loci.sum())

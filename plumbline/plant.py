@@ -89,6 +89,20 @@ class Plant:
         x2, p2 = np.nan_to_num(self.noise_x) ** 2, np.nan_to_num(self.noise_p) ** 2
         return Noise(np.full(count, (x2 + p2) * (f @ f)), np.full(count, x2 * (f @ f2)))
 
+    def w2_se(self, index: NDArray[np.int64], w2: float) -> float:
+        """Standard error of w2 fitted, with a constant, to the test functions at `index`, from white sensor noise alone [1/s2].
+
+        Test functions overlap: their errors are correlated as the autocorrelations of f'' - w2 f (x) and w2 f (p). NaN where the noise
+        is not known. The scatter of two or three independent pieces would tell it no better than by a factor of two.
+        """
+        f, f2 = self.bump.value, self.bump.curvature
+        lag = np.minimum(np.abs(index[:, None] - index[None]), len(f))
+        both = ((self.noise_x, f2 - w2 * f), (self.noise_p, w2 * f))
+        shared = sum(sd**2 * np.append(np.correlate(g, g, "full")[len(f) - 1 :], 0.0)[lag] for sd, g in both)
+        a = np.column_stack([self.lever[index], np.ones(len(index))])
+        bread = np.linalg.inv(a.T @ a)
+        return float(np.sqrt((bread @ a.T @ shared @ a @ bread)[0, 0]))
+
     def noise_variance(self, w2: float) -> float:
         """Variance [m2] of the error (x - p) - x''/w2 that white sensor noise alone gives; NaN where the noise is not known."""
         f, f2 = self.bump.value, self.bump.curvature

@@ -30,7 +30,8 @@ from plumbline.errors import PlumblineError
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Arrays = Sequence[Array]
-Real, Frames = ArrayLike, ArrayLike | None
+Real = ArrayLike
+Frames = ArrayLike | None
 
 SINGULAR = 1e-13
 """No estimate where this share or less of a regressor's sum of squares is left after the regressors before it are taken out."""
@@ -160,8 +161,7 @@ def _run(task: _Task, out: Array | None = None) -> Trace:
     most = CELLS // (RUN * width)
     if task.forgetting < 1.0:
         most = min(most, int(-np.log(GROWTH) / np.log(task.forgetting)) // RUN)
-    whole = -(-n // RUN)
-    runs = -(-whole // -(-whole // max(most, 1)))
+    runs = -(-n // (RUN * -(-n // (RUN * max(most, 1)))))
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         # ufuncs copy operands whose rows are not in one piece through buffers of this many numbers, which takes longer than the
         # work; rows longer than the buffer are used where they lie. errstate restores the size
@@ -220,7 +220,7 @@ def _columns(task: _Task, desk: _Desk, out: Array) -> Ints:
         if task.forgetting < 1.0:
             flat[:p] *= desk.power
         full, rest = divmod(stop - start, RUN)
-        np.copyto(out[:, start : stop - rest].reshape(p + c, full, RUN, -1), desk.s[:, :, :full].swapaxes(1, 2))
+        np.copyto(out[:, start : stop - rest].reshape(p + c, full, RUN, out.shape[2]), desk.s[:, :, :full].swapaxes(1, 2))
         np.copyto(out[:, stop - rest : stop], desk.s[:, :rest, full % desk.runs])
     return np.flatnonzero(~np.isfinite(carry).all(axis=(0, 1)))
 
@@ -231,7 +231,7 @@ def _load(task: _Task, desk: _Desk, start: int, stop: int) -> None:
     if full < desk.runs:
         desk.x[:, :, full:] = 0.0
     for plane, source in zip(desk.x, task.data, strict=True):
-        np.copyto(plane[:, :full], source[start : stop - rest].reshape(full, RUN, -1).swapaxes(0, 1))
+        np.copyto(plane[:, :full], source[start : stop - rest].reshape(full, RUN, plane.shape[2]).swapaxes(0, 1))
         np.copyto(plane[:rest, full % desk.runs], source[stop - rest : stop])
     if task.first.max() > start or task.last.min() < stop:
         frame = start + desk.frame

@@ -234,7 +234,7 @@ TABLES: dict[str, list[Column]] = {
         *_with_interval("limit_left", "m", "left limit of the ZMP; NaN where never reached"),
         *_with_interval("limit_right", "m", "right limit of the ZMP; NaN where never reached"),
         *_with_interval("delay", "s", "age of the state in the law; NaN where not fitted"),
-        _c("q1_real", "float", "1", "real part of q1; the closed loop's poles are -omega q"),
+        _c("q1_real", "float", "1", "real part of q1; the closed loop's poles are -omega q; NaN with a delay, which has endless poles"),
         _c("q1_imag", "float", "1", "imaginary part of q1"),
         _c("q2_real", "float", "1", "real part of q2"),
         _c("q2_imag", "float", "1", "imaginary part of q2"),

@@ -211,7 +211,7 @@ def _traces(group: Group, passes: Passes, signals: pd.DataFrame, offset: float) 
     forward, backward = rls.returning(acceleration, [lever], length=length)
     scatter = np.nanmedian(np.abs(acceleration - lever * backward.theta[0][0])) / 0.6745
     sd = rls.deviation(backward, float(scatter) * np.sqrt(2 * FILTER_TIME * rate))[0]
-    w = [np.sqrt(np.maximum(one.theta[0], 0.0)) for one in (forward, backward)]
+    w = [np.sqrt(np.where(one.theta[0] > 0, one.theta[0], np.nan)) for one in (forward, backward)]
     pieces = []
     for j in range(len(length)):
         locus, n = group.loci.iloc[j], int(length[j])

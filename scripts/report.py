@@ -11,7 +11,9 @@ from plumbline.report import CAPTIONS, linked, page, pictures
 snakemake: Snakemake
 job.start(snakemake)
 params, given = snakemake.params, snakemake.input
-read = {n: tables.read_all(n, given[n]) for n in ("trials", "coverage", "loci", "pushes", "fit")}
+read = {
+    n: tables.read_all(n, given[n]) for n in ("trials", "coverage", "loci", "pushes", "trust", "clusters", "choice", "controller", "fit")
+}
 read["where"] = tables.read_all("where", given.where, columns=["subject", "axis", "view"])
 read |= {n: tables.read(n, given[n]) for n in ("ladder", "exclusions")}
 read["residuals"] = tables.read_all("residuals", given.residuals, columns=linked.COLUMNS)

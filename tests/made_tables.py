@@ -35,16 +35,77 @@ def study(subjects: int = 1, trials: int = 3, *, pushes: bool = True, names: str
 
 
 def finish(out: dict[str, Any]) -> dict[str, Any]:
-    """Add what follows from the signals: fit, heldout, residuals, where, ladder, exclusions, verdict."""
+    """Add what follows from the signals: fit, heldout, residuals, where, ladder, exclusions, verdict; and a made-up controller."""
     given = [out[k] for k in ("signals", "pushes", "loci", "coverage")]
     fit, heldout = identify(*given, CONFIG["evaluation"])
     out["fit"], out["heldout"] = _typed("fit", fit), _typed("heldout", heldout)
     frames, where = residuals(*given, out["heldout"], CONFIG["evaluation"])
     out["residuals"], out["where"] = _typed("residuals", frames), _typed("where", where)
     out["ladder"] = _typed("ladder", ladder(out["heldout"]))
+    out |= controller(out["loci"])
     out["exclusions"] = _typed("exclusions", exclusions(out["trials"], []))
     out["verdict"] = verdict(out["ladder"], CONFIG["evaluation"], out["coverage"], out["heldout"])
     return out
+
+
+def controller(loci: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """Tables trust, rls, clusters, choice, controller as two stages would leave them; the numbers are made up.
+
+    Every locus that recovers is at a limit for 0.3 s; one that falls, always.  Two methods see k1 = 4, least squares 3.6.
+    """
+    groups = loci[["subject", "task", "condition"]].drop_duplicates().to_dict("records")
+    rows = [{str(k): v for k, v in r.items()} for r in loci.to_dict("records")]
+    tried = ({"number": 1, "score": -1.6, "chosen": True}, {"number": 2, "score": -1.7, "gain_se": 0.1})
+    return {
+        "trust": _full("trust", [part for r in rows for part in _regimes(r)]),
+        "rls": pd.concat([_passes(r) for r in rows], ignore_index=True) if rows else tables.empty("rls"),
+        "clusters": _full("clusters", [_member(r, i) for i, r in enumerate(rows)]),
+        "choice": _full("choice", [g | one for g in groups for one in tried]),
+        "controller": _full("controller", [g | law for g in groups for law in _laws(len(loci) // len(groups))]),
+    }
+
+
+def _regimes(locus: dict[str, Any]) -> list[dict[str, Any]]:
+    about = {k: locus[k] for k in ("trial", "subject", "task", "condition", "locus")}
+    switch = locus["start"] + 0.3
+    first = {"part": 1, "regime": locus["side"], "start": locus["start"], "end": locus["end"], "source": "start"}
+    if locus["kind"] == "falling":
+        return [about | first]
+    later = {"part": 2, "regime": "inside", "start": switch, "end": locus["end"], "source": "found", "found": switch, "rls": switch - 0.012}
+    return [about | first | {"end": switch}, about | later]
+
+
+def _passes(locus: dict[str, Any]) -> pd.DataFrame:
+    """Estimates that come from far away at the start of either pass."""
+    time = np.arange(locus["start"], locus["end"], 1 / RATE)
+    late, left = time - time[0] + 0.01, time[-1] - time + 0.01
+    columns: dict[str, Any] = {"frame": np.round(time * RATE).astype(int), "time": time, "stray": 0.1}
+    for name, value in (("omega", 3.0), ("k1", 4.0), ("k2", 0.9)):
+        columns |= {f"{name}_forward": value - 1 / late, f"{name}_backward": value + 5 / left, f"{name}_sd": 1 / left}
+    columns["omega_sd"] = np.where(left < 0.5, np.inf, columns["omega_sd"])
+    return pd.DataFrame({k: locus[k] for k in ("trial", "subject", "locus")} | columns)
+
+
+def _member(locus: dict[str, Any], number: int) -> dict[str, Any]:
+    about = {k: locus[k] for k in ("trial", "subject", "task", "condition", "locus", "kind")} | {"reach": 0.05 + 0.01 * number}
+    if locus["kind"] == "falling":
+        return about | {"note": "falls: its ZMP only shows the limit"}
+    omega = 3.0 + 0.05 * (-1) ** number
+    return about | {"omega": omega, "omega_low": omega - 0.3, "omega_high": omega + 0.3, "cluster": 1, "share": 1.0, "gains": True}
+
+
+def _laws(loci: int) -> list[dict[str, Any]]:
+    base: dict[str, Any] = {"loci": loci, "feedback_sd": 3e-3, "q1_real": 1.35, "q1_imag": 1.0, "q2_real": 1.35, "q2_imag": -1.0}
+    values = {"omega": (3.0, 0.05), "reference": (0.002, 5e-4), "k2": (0.9, 0.03), "limit_left": (-0.1, 1e-4), "limit_right": (0.09, 1e-4)}
+    for name, (value, half) in values.items():
+        base |= {name: value, f"{name}_low": value - half, f"{name}_high": value + half}
+    plain = base | {"k1": 4.0, "k1_low": 3.9, "k1_high": 4.1}
+    late = plain | {"k1_low": 3.5, "k1_high": 4.5, "delay": 0.004, "delay_low": 0.0, "delay_high": 0.021, "error": 8e-4}
+    naive = base | {"k1": 3.6, "k1_low": 3.55, "k1_high": 3.65, "warning": "least squares: for comparison only"}
+    return [
+        plain | {"method": "output error", "error": 8e-4}, late | {"method": "output error with delay"}, plain | {"method": "instruments"},
+        naive | {"method": "saturation"},
+    ]  # fmt: skip
 
 
 def _typed(name: str, frame: pd.DataFrame) -> pd.DataFrame:

@@ -11,18 +11,22 @@ import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.axes import Axes
 from matplotlib.colors import same_color
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
 from plumbline import tables
-from plumbline.figures import _style, fit, ladder, loci, residuals, signals, where
+from plumbline.figures import _style, clusters, fit, ladder, loci, residuals, signals, trust, where
 
 Tables = dict[str, Any]
 
 DRAW: dict[str, Callable[[Tables], Figure]] = {
     "signals": lambda t: signals.draw(t["signals"], t["pushes"], t["coverage"]),
     "loci": lambda t: loci.draw(t["signals"], t["loci"], t["fit"]),
+    "trust": lambda t: trust.draw(**{k: t[k] for k in ("trust", "rls", "signals", "loci", "clusters", "controller")}),
+    "clusters": lambda t: clusters.draw(**{k: t[k] for k in ("clusters", "choice", "controller")}),
     "fit": lambda t: fit.draw(t["fit"]),
     "residuals": lambda t: residuals.draw(t["residuals"]),
     "where": lambda t: where.draw(t["where"]),
@@ -107,6 +111,8 @@ def test_figures_beside_tables(pushed: Tables, files: dict[str, bytes], tmp_path
     [
         ("signals", "no trial of this part could be used"),
         ("loci", "no locus in the 0 trials"),
+        ("trust", "no loci in the 0 trials"),
+        ("clusters", "no loci, so no controller"),
         ("fit", "both a CoM and a ZMP"),
         ("residuals", "no trial could be left out"),
         ("where", "no trial could be left out"),
@@ -124,6 +130,7 @@ def test_quiet_standing(quiet: Tables) -> None:
     """Without pushes the phase portrait and the time since the push say so; the rest is drawn."""
     assert "nobody was pushed" in texts(DRAW["loci"](quiet))
     assert "no loci" in texts(DRAW["where"](quiet))
+    assert "no controller" in texts(DRAW["trust"](quiet))
     assert "No push was marked or found" in texts(DRAW["signals"](quiet))
     assert "rms" in texts(DRAW["residuals"](quiet))
 
@@ -166,7 +173,7 @@ def test_axis_that_does_not_fall() -> None:
 def test_odd_names(tmp_path: Path) -> None:
     """Dollar signs, underscores and angle brackets in file names start no formula and break no file."""
     made = made_tables.study(trials=3, names="$x_{1$<b>&")
-    for name in ("signals", "residuals"):
+    for name in ("signals", "trust", "residuals"):
         ET.fromstring(drawn(DRAW[name](made), tmp_path / f"{name}.svg"))
 
 
@@ -230,7 +237,7 @@ def test_kinds_are_told_apart(pushed: Tables) -> None:
     assert sum(ln.get_marker() == "x" for ln in figure.axes[0].lines) == 3
 
 
-@pytest.mark.parametrize(("name", "most"), [("loci", loci.MOST), ("fit", fit.MOST), ("residuals", residuals.MOST)])
+@pytest.mark.parametrize(("name", "most"), [("loci", loci.MOST), ("trust", trust.MOST), ("fit", fit.MOST), ("residuals", residuals.MOST)])
 def test_what_is_not_drawn_is_named(name: str, most: int) -> None:
     """A part with more subjects than a page holds names those left out and where their rows are."""
     made = made_tables.study(subjects=most + 1, trials=2)
@@ -278,6 +285,133 @@ def test_floor_and_interval(pushed: Tables) -> None:
     orange = [ln for ln in lines if same_color(ln.get_color(), _style.RESIDUAL)]
     assert list(black[0].get_xdata()) == [row["noise_floor_mm"]] * 2
     assert list(orange[0].get_xdata()) == [row["ci_low_mm"], row["ci_high_mm"]]
+
+
+# -- controller -------------------------------------------------------------------------------------------------------
+
+
+def blue(axes: Axes) -> list[Line2D]:
+    """Lines in the model's colour."""
+    return [ln for ln in axes.lines if same_color(ln.get_color(), _style.MODEL)]
+
+
+def test_law_is_clipped_at_its_limits_alone() -> None:
+    """The law drawn is d + k1 (x - d) + k2 x', held at the limits that were ever reached and at no other."""
+    row = pd.Series({"reference": 0.01, "k1": 4.0, "k2": 0.5, "limit_left": -0.05, "limit_right": np.nan})
+    x, v = np.array([0.01, 0.03, -0.5, 0.5]), np.array([0.0, -0.1, 0.0, 0.0])
+    np.testing.assert_allclose(trust.law(x, v, row), [0.01, 0.04, -0.05, 1.97], atol=1e-12)
+
+
+def test_motion_of_a_parabola() -> None:
+    """A parabola's position and velocity are found exactly, up to both ends; a gap leaves NaN where a window meets it."""
+    t = np.arange(0, 1, 0.01)
+    x, v = trust.motion(0.1 - 0.3 * t + 0.7 * t**2, t)
+    np.testing.assert_allclose(x, 0.1 - 0.3 * t + 0.7 * t**2, atol=1e-12)
+    np.testing.assert_allclose(v, -0.3 + 1.4 * t, atol=1e-11)
+    holed = t.copy()
+    holed[50] = np.nan
+    assert set(np.flatnonzero(np.isnan(trust.motion(holed, t)[1]))) == set(range(40, 61))
+    assert np.isnan(trust.motion(t[:5], t[:5])[0]).all()
+
+
+def test_trust_draws_the_tables(pushed: Tables) -> None:
+    """Measured ZMP and CoM are those of the frames in mm, the blue line is the law, black and blue lines stand at the switches."""
+    axes = DRAW["trust"](pushed).axes[0]
+    parts = pushed["trust"]
+    part = parts[parts["part"] == 2].iloc[1]  # the median of three loci alike
+    frames = pushed["signals"][pushed["signals"]["trial"] == part["trial"]]
+    assert part["trial"] in axes.get_title(loc="left")
+    assert set(axes.lines[0].get_ydata()) <= set(1e3 * frames["zmp_x"])
+    assert set(axes.lines[1].get_ydata()) <= set(1e3 * frames["com_x"])
+    mine = frames[(frames["time"] >= part["start"] - 0.3 - 1e-9) & (frames["time"] <= part["start"] + 2.0)]
+    row = pushed["controller"].iloc[0]
+    expected = 1e3 * trust.law(*trust.motion(mine["com_x"].to_numpy(), mine["time"].to_numpy()), row)
+    drawn = blue(axes)[0]
+    at = np.searchsorted(mine["time"].to_numpy(), drawn.get_xdata()[:100] - 1e-9)
+    np.testing.assert_allclose(drawn.get_ydata()[:100], expected[at], atol=1e-9)
+    upright = {(round(ln.get_xdata()[0], 6), ln.get_linestyle()) for ln in axes.lines if len(set(ln.get_xdata())) == 1}
+    assert upright == {(round(part["found"], 6), "-"), (round(part["rls"], 6), "--")}
+    assert "RLS -12 ms" in axes.get_title(loc="left")
+
+
+def test_wild_estimates_run_off_the_axis(pushed: Tables) -> None:
+    """The axis of a pass is centred on the identified value; what is far from it stays in the line, beyond the axis."""
+    axes = DRAW["trust"](pushed).axes[1]
+    low, high = axes.get_ylim()
+    assert (low + high) / 2 == pytest.approx(4.0)
+    forward, backward = (next(ln for ln in blue(axes) if ln.get_linestyle() == style and len(ln.get_xdata()) > 2) for style in (":", "-"))
+    assert np.isfinite(forward.get_ydata()).all()
+    assert forward.get_ydata().min() < low
+    assert np.isfinite(backward.get_ydata()).all()
+
+
+def test_a_person_s_mark_is_drawn_with_its_distance(pushed: Tables) -> None:
+    """A locus with a person's mark is preferred; the mark is a dotted line, its distance from the change point in words."""
+    table = pushed["trust"].copy()
+    last = table.index[(table["part"] == 2)][-1]
+    table.loc[last, ["mark", "mark_distance"]] = table.loc[last, "found"] + 0.03, -0.03
+    figure = DRAW["trust"]({**pushed, "trust": table})
+    assert table.loc[last, "trial"] in figure.axes[0].get_title(loc="left")
+    assert "person +30 ms" in figure.axes[0].get_title(loc="left")
+    assert "switch by a person" in texts(figure)
+    assert "switch by a person" not in texts(DRAW["trust"](pushed))
+
+
+def test_law_of_the_locus_s_own_cluster(pushed: Tables) -> None:
+    """Where loci form clusters a locus is held against its own; where that has no gains, against the law behind most loci."""
+    plain = pushed["controller"].iloc[:1]
+    few, most = plain.assign(cluster=1, omega=2.5, k1=3.0, loci=3), plain.assign(cluster=2, k1=5.0, loci=9)
+    locus = pd.concat([pushed["loci"].iloc[0], pd.Series({"cluster": 1})])
+    for rows, k1 in (([most, few], 3.0), ([most, few.assign(k1=np.nan)], 5.0)):
+        row, omega = trust.identified(pd.concat(rows), locus)
+        assert row is not None
+        assert (row["k1"], omega) == (k1, 2.5)
+    assert trust.identified(plain.assign(subject="sub-77"), locus)[0] is None
+
+
+def test_without_gains(pushed: Tables) -> None:
+    """A group whose gains cannot be told has its reason in the panel; the regimes are drawn without a law."""
+    reason = "2 loci do not fall; 3 are needed"
+    none = pushed["controller"].iloc[:1].assign(k1=np.nan, k2=np.nan, warning=reason)
+    assert reason in texts(clusters.draw(pushed["clusters"], pushed["choice"], none))
+    assert "no gains, so no law" in texts(DRAW["trust"]({**pushed, "controller": none}))
+    said = texts(DRAW["trust"]({**pushed, "trust": tables.empty("trust"), "rls": tables.empty("rls")}))
+    assert "no gains can be told from the 6 loci" in said
+
+
+def test_clusters_draw_the_tables(pushed: Tables) -> None:
+    """Loci stand at their reach in mm and their omega; the batch omega is a line; loci without one are counted."""
+    figure = DRAW["clusters"](pushed)
+    known = pushed["clusters"].dropna(subset="omega")
+    points = {(round(float(ln.get_xdata()[0]), 9), float(ln.get_ydata()[0])) for ln in figure.axes[0].lines if ln.get_marker() == "o"}
+    assert points == set(zip((1e3 * known["reach"]).round(9), known["omega"], strict=True))
+    assert "3 loci, 3 without" in figure.axes[0].get_title(loc="left")
+    assert "1 chosen" in texts(figure)
+    gains = {ln.get_marker(): ln.get_xdata()[0] for ln in figure.axes[2].lines if len(ln.get_xdata()) == 1}
+    assert gains == {"o": 4.0, "^": 4.0, "s": 4.0, "x": 3.6}
+
+
+def test_clusters_are_told_apart(pushed: Tables) -> None:
+    """Each cluster has its own mark and shade, and its own omega behind it; a score far below the best is a triangle."""
+    members, controller = pushed["clusters"].copy(), pushed["controller"]
+    known = members.index[members["cluster"] == 1]
+    members.loc[known[0], ["cluster", "omega"]] = 2, 3.6
+    own = [controller.assign(cluster=k, omega=w, loci=n) for k, w, n in ((1, 3.0, 9), (2, 3.6, 3))]
+    bad = pushed["choice"].assign(score=[-1.6, -80.0])
+    figure = clusters.draw(members, bad, pd.concat(own, ignore_index=True))
+    marks = {(ln.get_marker(), ln.get_color()) for ln in figure.axes[0].lines if ln.get_marker() in clusters.MARKS}
+    assert len(marks) == 2
+    levels = {ln.get_ydata()[0] for ln in figure.axes[0].lines if list(ln.get_xdata()) == [0, 1]}
+    assert levels == {3.0, 3.6}
+    assert "v" in {ln.get_marker() for ln in figure.axes[1].lines}
+    assert sum(len(ln.get_xdata()) == 1 for ln in figure.axes[2].lines) == 4 + 1  # every method of the larger, one of the smaller
+    assert figure.axes[1].get_ylim()[0] > -3
+
+
+def test_groups_not_drawn_are_named() -> None:
+    """More groups than a page holds: those left out are named."""
+    made = made_tables.study(subjects=clusters.MOST + 1, trials=2)
+    assert f"Not drawn: sub-{clusters.MOST + 1:02d} lateral; their rows are in results/clusters." in texts(DRAW["clusters"](made))
 
 
 # -- lines ------------------------------------------------------------------------------------------------------------

@@ -14,10 +14,10 @@ import pytest
 from bokeh.plotting import figure
 
 from plumbline import report, tables
-from plumbline.report import linked, methods, sheets, words
+from plumbline.report import controller, linked, methods, sheets, words
 
 Tables = dict[str, Any]
-SECTIONS = ("result", "read", "excluded", "loci", "omega", "figures", "explore", "ladder", "methods", "reading")
+SECTIONS = ("result", "read", "excluded", "loci", "omega", "controller", "figures", "explore", "ladder", "methods", "reading")
 
 
 @pytest.fixture(scope="module")
@@ -91,7 +91,7 @@ def said(html: str) -> str:
 def test_loads_nothing(page: str) -> None:
     """Every address in the page is a place in it, data inside it, or a file beside it; none is on a network."""
     addresses = read(page).addresses
-    assert sum(a.startswith("data:image/svg+xml;base64,") for a in addresses) == 6
+    assert sum(a.startswith("data:image/svg+xml;base64,") for a in addresses) == 8
     assert all(a.startswith(("#", "data:")) or re.fullmatch(r"[a-z_/0-9-]+\.svg", a) for a in addresses)
     assert not re.search(r"""(src|href)\s*=\s*["']?\s*(https?:)?//""", page)
     assert "@import" not in page
@@ -222,7 +222,7 @@ def test_cohort_links_what_it_does_not_hold(made: Tables, results: Path) -> None
     pictures = report.pictures(results, parts, made_report.CAPTIONS, made_tables.CONFIG)
     html = report.page("cohort", made, made["verdict"], made_tables.CONFIG, pictures)
     addresses = read(html).addresses
-    assert sum(a.startswith("data:image/svg") for a in addresses) == 2 + 4 * report.INLINE_PARTS
+    assert sum(a.startswith("data:image/svg") for a in addresses) == 2 + len(report.STAGES) * report.INLINE_PARTS
     assert all(f"{stage}/_{part}.svg" in addresses for stage in report.STAGES for part in parts)
 
 
@@ -235,6 +235,127 @@ def test_captions_carry_parameters(results: Path) -> None:
     assert not any("{{" in c or "{%" in c for c in captions.values())
 
 
+# -- controller -------------------------------------------------------------------------------------------------------
+
+
+def law(**changes: Any) -> pd.Series:
+    """A row of `controller`, changed."""
+    row = {"k1": 4.0, "k2": 0.9, "omega": 3.0, "error": 1.2e-3, "warning": ""}
+    return pd.Series({**row, "q1_real": 1.35, "q1_imag": 1.0, "q2_real": 1.35, "q2_imag": -1.0, **changes})
+
+
+def test_controller_section(made: Tables, page: str) -> None:
+    """Omega, gains, limits with intervals, the delay in words, loci used and left out with the reason: each stands in the page."""
+    text = said(page).replace("\u00a0", " ")
+    for word in (
+        "4.000 3.900 to 4.100", "0.900 0.870 to 0.930", "-100.00 -100.10 to -99.90", "2.00 1.50 to 2.50", "no delay found at most 21 ms",
+        "1 cluster in sub-01 lateral, sub-02 lateral", "6 switches between a limit and the law in 12 loci", "saw 6 of them, half of these "
+        "within 12 ms; no person marked any", "3: falls: its ZMP only shows the limit", "least squares: the counter-example",
+    ):  # fmt: skip
+        assert word in text
+    made_sections = controller.section(made)
+    assert [r[0] for r in made_sections.law.rows] == ["sub-01", "sub-02"]
+    assert len(made_sections.methods.rows) == 8
+    assert made_sections.methods.copy.splitlines()[0].split("\t") == list(made["controller"])
+
+
+def test_no_loci_no_controller(nothing: Tables) -> None:
+    """Without loci the section is one plain sentence, and the methods claim no law."""
+    text = said(made_report.page(nothing))
+    assert "No loci, so no controller" in text
+    assert "counter-example" not in text
+    assert "output error" not in " ".join(methods.paragraphs(nothing, nothing["verdict"], made_tables.CONFIG))
+    assert not any("Ljung" in source for source in methods.references(nothing))
+
+
+@pytest.mark.parametrize(
+    ("late", "warning", "words_"),
+    [
+        ({"delay": 0.0, "delay_low": 0.0, "delay_high": 0.0173}, "", "no delay found\nat most 17 ms"),
+        ({"delay": 0.02, "delay_low": 0.0, "delay_high": 0.0403}, "", "no delay found\nat most 40 ms"),
+        ({"delay": 0.08, "delay_low": 0.071, "delay_high": 0.089}, "a delay of 80 ms lowers the error", "80 ms\n71 to 89 ms"),
+        ({"delay": 0.068, "delay_low": 0.037, "delay_high": 0.099}, "", "not shown: 68 ms, 37 to 99 ms, but the error stays 1.19 mm (1.20"),
+        ({"delay": 0.05, "delay_low": np.nan, "delay_high": np.nan}, "", "50 ms, no interval"),
+        ({"delay": np.nan, "delay_low": np.nan, "delay_high": np.nan}, "", "not fitted"),
+        ({"delay": 0.05, "delay_low": 0.04, "delay_high": 0.06, "warning": "the search did not settle"}, "", "not told: the search"),
+    ],
+)
+def test_delay_in_words(late: dict[str, Any], warning: str, words_: str) -> None:
+    """An interval that holds nought is no delay; one that does not must also lower the error before a delay is claimed."""
+    assert controller.delay(law(warning=warning), law(**{"error": 1.19e-3, **late})).startswith(words_)
+    assert controller.delay(law(), None) == "not fitted"
+
+
+@pytest.mark.parametrize(
+    ("q1", "q2", "words_"),
+    [
+        (1.35 + 1.0j, 1.35 - 1.0j, "swings at 0.48 Hz damping 0.80"),
+        (-0.1 + 1.0j, -0.1 - 1.0j, "swings, and ever wider"),
+        (2.0, 0.5, "does not swing time constants 0.17 and 0.67 s"),
+        (2.0, -0.5, "does not return"),
+        (complex("nan"), complex("nan"), "\u2013"),
+    ],
+)
+def test_poles_in_words(q1: complex, q2: complex, words_: str) -> None:
+    """Complex poles -omega q swing at omega Im(q) / 2 pi, real ones have the time constants 1 / (omega q)."""
+    q1, q2 = complex(q1), complex(q2)
+    row = law(q1_real=q1.real, q1_imag=q1.imag, q2_real=q2.real, q2_imag=q2.imag)
+    assert " ".join(controller.loop(row).split()) == words_
+
+
+def test_intervals_in_words() -> None:
+    """A limit that no locus reached is said to be so; an interval that is not known is no interval; without gains there is a dash."""
+    row = law(limit_left=np.nan, limit_left_low=np.nan, limit_left_high=np.nan, k1_low=np.nan, k1_high=np.nan)
+    assert controller.estimate(row, "limit_left", 2, 1e3) == "never reached"
+    assert controller.estimate(row, "k1", 3) == "4.000\nno interval"
+    none = law(k1=np.nan, k1_low=np.nan, k1_high=np.nan, limit_left=np.nan, limit_left_low=np.nan, limit_left_high=np.nan)
+    assert {controller.estimate(none, "limit_left", 2), controller.estimate(none, "k1", 3)} == {"\u2013"}
+
+
+def test_gains_that_cannot_be_told(made: Tables) -> None:
+    """Where too few loci remain the table has dashes, no locus counts as used, the reason stands beside it, and methods claim nothing."""
+    reason = "2 loci do not fall and have an unbroken CoM and ZMP; 3 are needed"
+    empty = {k: np.nan for k in made["controller"] if k.startswith(("k1", "k2", "limit", "reference", "q1", "q2", "feedback", "delay"))}
+    few = made["controller"][made["controller"]["method"] == "output error"].assign(warning=reason, **empty)
+    section = controller.section({**made, "controller": few, "trust": tables.empty("trust")})
+    assert "No regimes" in section.sentences[1]
+    assert list(section.law.rows[0][3:6]) == ["3.000\n2.950\u00a0to\u00a03.050", "\u2013", "\u2013"]
+    assert section.law.rows[0][-1] == reason
+    assert section.bounds.rows[0][-2] == "0"
+    assert section.methods.empty
+    assert "could not be told" in " ".join(methods.paragraphs({**made, "controller": few}, made["verdict"], made_tables.CONFIG))
+
+
+def test_loci_left_out(made: Tables) -> None:
+    """Loci left out of the gains are counted with their reasons; those used in part keep theirs; a missing reason is said to be."""
+    members = made["clusters"].copy()
+    members.loc[members.index[0], "note"] = "its end is cut"
+    members.loc[members.index[1], "note"] = ""
+    out = controller.section({**made, "clusters": members}).bounds.rows[0][-1]
+    assert out.text == "3 loci"
+    assert out.more == ("2: falls: its ZMP only shows the limit", "1: no reason given", "1 used in part: its end is cut")
+
+
+def test_clusters_and_marks_in_words(made: Tables) -> None:
+    """Groups are counted by their number of clusters; clusters have rows of their own; distances to a person's marks are stated."""
+    choice = made["choice"].copy()
+    choice.loc[choice["subject"] == "sub-02", "chosen"] = [False, True]
+    members = made["clusters"]
+    assert "1 cluster in sub-01 lateral; 2 clusters in sub-02 lateral" in controller.numbers(choice, members)
+    assert "In 2 groups there were too few loci" in controller.numbers(choice[choice["number"] == 1], members)
+    assert "in no cluster" not in controller.numbers(choice, members)
+    members = members.assign(cluster=members["cluster"].where(members["omega"].isna() | (members["reach"] < 0.1), 2))
+    assert "in no cluster and in no gains: 3 loci" in controller.numbers(choice, members)
+    both = [made["controller"].assign(cluster=k) for k in (1, 2)]
+    section = controller.section({**made, "controller": pd.concat(both, ignore_index=True), "clusters": members})
+    assert [r[2] for r in section.law.rows if r[0] == "sub-01"] == ["cluster 1 of 2", "cluster 2 of 2"]
+    assert "sub-01 lateral, cluster 1: k1" in controller.results(pd.concat(both).iloc[:1])[0]
+    assert controller.results(pd.concat([*both, *both]))[0].endswith("over 8 groups of loci")
+    marked = made["trust"].assign(mark=made["trust"]["found"] + 0.02, mark_distance=-0.02)
+    assert "a person marked 6, half of these within 20 ms" in controller.switches(marked)
+    assert "marked override" in " ".join(methods.paragraphs({**made, "trust": marked}, made["verdict"], made_tables.CONFIG))
+
+
 # -- methods ----------------------------------------------------------------------------------------------------------
 
 
@@ -244,9 +365,18 @@ def test_methods(made: Tables) -> None:
     for word in ("-3 dB at 2 Hz after both passes", "(1 - s\u00b2)^4", "half width 0.4 s", "eight folds", "numpy", "plumbline", "12 mm"):
         assert word in text
     assert words.number(made["verdict"]["plant"]["base_error_mm"]) in text
+    for word in (
+        "output error (Ljung 1999",
+        "returns from its end",
+        "6 of 12 loci were used",
+        "k1 4.000 (3.900 to 4.100)",
+        "-100.0 mm and 90.0 mm",
+    ):
+        assert word in text
     sources = " ".join(methods.references(made))
     assert "Murai" in sources
     assert "de Leva" in sources
+    assert "Ljung" in sources
     assert "Zatsiorsky VM (1997)" not in sources  # no CoM came from forces here
 
 

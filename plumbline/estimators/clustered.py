@@ -7,13 +7,20 @@ from scipy.special import stdtrit
 Array = NDArray[np.float64]
 
 
-def sandwich(bread: Array, scores: Array) -> Array:
-    """Cluster-robust covariance (Liang and Zeger 1986) with the factor g/(g - 1), shape (k, k); NaN for one locus.
+def jackknife(normals: Array, scores: Array) -> Array:
+    r"""Covariance of an estimate from what each locus, left out, would move it by, shape (k, k); NaN for one locus.
 
-    bread: inverse of the derivative of the estimating equations, (k, k).  scores: their sum over each locus, (g, k).
+    .. math:: \frac{g-1}{g} \sum_j \Delta_j \Delta_j^T, \qquad \Delta_j = (N - N_j)^{-1} s_j
+
+    normals: derivative of the estimating equations over each locus, (g, k, k).  scores: their sum over each locus, (g, k).
+    To first order this is the cluster-robust sandwich (Liang and Zeger 1986), which is too small where single loci weigh much: such a
+    locus bends the estimate towards itself and its score is small (Bell and McCaffrey 2002, CR3).
     """
     g = len(scores)
-    return np.asarray(bread @ (scores.T @ scores) @ bread.T * (g / (g - 1) if g > 1 else np.nan))
+    if g < 2:
+        return np.full((scores.shape[1],) * 2, np.nan)
+    moved = np.stack([np.linalg.pinv(normals.sum(0) - one) @ s for one, s in zip(normals, scores, strict=True)])
+    return np.asarray((g - 1) / g * moved.T @ moved)
 
 
 def reach(variance: float, loci: int, level: float = 0.95) -> float:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from plumbline.batch import Batch
 from plumbline.estimators import output_error
-from plumbline.estimators.clustered import sandwich
+from plumbline.estimators.clustered import jackknife
 from plumbline.models.controller import Law
 from plumbline.switching import Regime
 
@@ -47,12 +47,12 @@ def fit(batch: Batch, regime: Regime, start: Law, omega: float, feedback_sd: flo
         return None
     one = np.ones(batch.x.shape)
     zeta, phi = (np.stack([one, motion.x, motion.v]) * chosen for motion in (free, seen))
-    normal = np.einsum("inm,jnm->ij", zeta, phi)
+    normals = np.einsum("inm,jnm->mij", zeta, phi)[chosen.any(0)]
+    normal = normals.sum(0)
     c, k1, k2 = np.linalg.solve(normal, np.einsum("inm,nm->i", zeta, batch.p))
     error = batch.p - np.tensordot([c, k1, k2], phi, 1)
-    bread = np.linalg.inv(normal)
     scores = np.einsum("inm,nm->mi", zeta, np.where(chosen, error, 0.0))[chosen.any(0)]
     d = c / (1 - k1)
     to_d = np.array([[1 / (1 - k1), d / (1 - k1), 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])  # (c, k1, k2) -> (d, k1, k2)
     law = start._replace(d=float(d), k1=float(k1), k2=float(k2))
-    return Instruments(law, to_d @ sandwich(bread, scores) @ to_d.T, len(scores))
+    return Instruments(law, to_d @ jackknife(normals, scores) @ to_d.T, len(scores))

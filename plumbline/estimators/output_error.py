@@ -12,7 +12,7 @@ the same limit :math:`\delta p = 0`: half a millimetre of a limit would grow as 
 
 each in its own rms (Levenberg 1944, Marquardt 1963): the CoM alone hardly tells a delay from larger gains, the ZMP shows when the law
 acts. Feedback noise reaches the outputs but not the simulated regressors: unlike least squares the estimate is consistent
-(Ljung 1999, section 7.3). Intervals: sandwich clustered by locus.
+(Ljung 1999, section 7.3). Intervals: loci left out one by one.
 """
 
 from typing import NamedTuple
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from plumbline.batch import LEAD, Batch
 from plumbline.estimators import saturation
-from plumbline.estimators.clustered import sandwich
+from plumbline.estimators.clustered import jackknife
 from plumbline.models.controller import Law
 from plumbline.switching import Regime
 
@@ -102,18 +102,15 @@ def _descend(
     return theta, converged
 
 
-def search(batch: Batch, regime: Regime, start: Law, omega: float, *, gain: float = 0.0) -> OutputError | None:
+def search(batch: Batch, regime: Regime, start: Law, omega: float) -> OutputError:
     """Fit with a delay, from two first guesses: the cost has more than one valley.
 
     The guesses are no delay and the one with the least equation error. The latter sees a delay nearly everywhere (feedback noise is
-    older than the state it moves), so it only starts the search.  gain: share of the equation error that a delay must take off for the
-    search to begin at all; None where it does not.
+    older than the state it moves), so it only starts the search.
     """
     inside = batch.inside & (regime == 0)
     late = [(float(g), *_equation_error(batch.late(float(g)), inside)) for g in np.arange(0.0, LONGEST, GRID)]
     delay, cost, d, k1, k2 = min(late, key=lambda one: one[1])
-    if not cost <= (1 - gain) * late[0][1]:
-        return None
     guesses = [start, start._replace(d=d, k1=k1, k2=k2, delay=delay)] if np.isfinite(cost) else [start]
     return min((fit(batch, regime, one, omega, delayed=True) for one in guesses), key=lambda one: one.misfit)
 
@@ -141,12 +138,12 @@ def _certified(
     theta: Array, count: int, scale: Array, batch: Batch, regime: Regime, omega: float, limits: tuple[float, float], converged: bool
 ) -> OutputError:
     error, slopes = _derivatives(theta, count, scale, batch, regime, omega, limits)
-    bread = np.linalg.pinv(np.einsum("iynm,jynm->ij", slopes, slopes))
+    normals = np.einsum("iynm,jynm->mij", slopes, slopes)
     scores = np.einsum("iynm,ynm->mi", slopes, error)
     law = Law(float(theta[0]), float(theta[1]), float(theta[2]), *limits, delay=float(theta[3]))
     size = float(np.sqrt(np.sum(error[0] ** 2) / batch.inside.sum()) * scale[0, 0, 0])
     fit = float(np.prod(scale))
-    return OutputError(law, sandwich(bread, scores), size, fit, error.shape[2], converged)
+    return OutputError(law, jackknife(normals, scores), size, fit, error.shape[2], converged)
 
 
 def simulate(points: Array, batch: Batch, regime: Regime, omega: float, limits: tuple[float, float]) -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plumbline.batch import Batch
-from plumbline.estimators.clustered import sandwich
+from plumbline.estimators.clustered import jackknife
 from plumbline.models.controller import Law
 
 Array = NDArray[np.float64]
@@ -108,13 +108,13 @@ def _certified(law: Law, batch: Batch) -> Saturation:
     region = law.region(batch.x, batch.v)
     free = here & (region == 0)
     columns = np.stack([np.full(batch.x.shape, 1 - law.k1), batch.x - law.d, batch.v]) * free
-    normal = np.einsum("inm,jnm->ij", columns, columns)
+    normals = np.einsum("inm,jnm->mij", columns, columns)[free.any(0)]
     scores = np.einsum("inm,nm->mi", columns, error)
     scores = scores[free.any(0)]
     return Saturation(
         law,
         float(np.sum(error**2)),
-        sandwich(np.linalg.pinv(normal), scores),
+        jackknife(normals, scores),
         _robust_rms(error[free]),
         _robust_rms(error[here & (region != 0)]),
         len(scores),

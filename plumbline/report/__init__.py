@@ -9,18 +9,20 @@ from typing import Any
 import jinja2
 import pandas as pd
 
-from plumbline.report import linked, methods, sheets, words
+from plumbline.report import controller, linked, methods, sheets, words
 
 DATA_FILES = ("page.html.j2", "page.css", "../../workflow/report/*.rst")  # the captions are those of the Snakemake report
 
 HERE = Path(__file__).parent
 CAPTIONS = HERE.parents[1] / "workflow" / "report"
 INLINE_PARTS = 3  # parts whose figures stand in the page; those of the others are linked
-STAGES = ("signals", "loci", "fit", "residuals")  # figures of a part, in the order data flow
+STAGES = ("signals", "loci", "trust", "clusters", "fit", "residuals")  # figures of a part, in the order data flow
 COHORT = {"where": "where/_all.svg", "ladder": "ladder.svg"}
 TITLES = {
     "signals": "From the recording to the CoM",
     "loci": "Phase portrait of all loci",
+    "trust": "Regimes of the controller and returning RLS",
+    "clusters": "Clusters of \u03c9 and gains",
     "fit": "Natural frequency",
     "residuals": "Measured and modelled",
     "where": "Where the model fails",
@@ -58,7 +60,8 @@ def page(
 ) -> str:
     """The whole page as HTML.
 
-    study: its name.  tables: trials, coverage, exclusions, loci, pushes, fit, where, ladder of all parts, residuals of the first.
+    study: its name.  tables: trials, coverage, exclusions, loci, pushes, trust, clusters, choice, controller, fit, where, ladder of all
+    parts, residuals of the first.
     verdict: what results/verdict.json holds.  config: its sections recording, signals, evaluation.  pictures: see :func:`pictures`.
     """
     view = linked.linked(tables["residuals"], tables["where"], config["evaluation"]["half_width"])
@@ -71,6 +74,7 @@ def page(
         look=words.look(verdict, tables["ladder"]),
         counts=words.counts(tables),
         sheets=sheets.all_sheets(tables),
+        controller=controller.section(tables),
         view=view,
         bokeh=linked.javascript() if view.roots else "",
         inline=[p for p in pictures if p.svg is not None],

@@ -8,6 +8,7 @@ from typing import Any
 import pandas as pd
 
 from plumbline import __version__
+from plumbline.report.controller import results
 from plumbline.report.words import number, plural, pooled
 
 OWN = "markerset"  # name of a marker set that came with the study
@@ -19,6 +20,7 @@ MURAI = (
 )
 LEVA = "de Leva P (1996) Adjustments to Zatsiorsky-Seluyanov's segment inertia parameters. Journal of Biomechanics 29:1223-1230."
 LIANG = "Liang KY, Zeger SL (1986) Longitudinal data analysis using generalized linear models. Biometrika 73:13-22."
+LJUNG = "Ljung L (1999) System Identification: Theory for the User, 2nd edition. Prentice Hall."
 KING = "King DL, Zatsiorsky VM (1997) Extracting gravity line displacement from stabilographic recordings. Gait & Posture 6:27-38."
 MOELDER = "M\u00f6lder F et al. (2021) Sustainable data analysis with Snakemake. F1000Research 10:33."
 
@@ -39,7 +41,8 @@ def references(tables: Mapping[str, pd.DataFrame]) -> list[str]:
     """Sources of the methods that were used."""
     used = set(tables["coverage"]["com_method"])
     built_in = set(tables["coverage"].loc[tables["coverage"]["com_method"] == "table", "marker_set"]) - {OWN}
-    return [MURAI, *([LEVA] if built_in else []), *([KING] if "force" in used else []), LIANG, MOELDER]
+    law = [LJUNG] if len(tables["controller"]) else []
+    return [MURAI, *([LEVA] if built_in else []), *([KING] if "force" in used else []), *law, LIANG, MOELDER]
 
 
 def paragraphs(tables: Mapping[str, pd.DataFrame], verdict: Mapping[str, Any], config: Mapping[str, Any]) -> list[str]:
@@ -47,6 +50,7 @@ def paragraphs(tables: Mapping[str, pd.DataFrame], verdict: Mapping[str, Any], c
     return [
         " ".join([_recordings(tables, config), _com(tables["coverage"]), _filter(config)]),
         " ".join([_model(config["evaluation"]), _judging(config["evaluation"]), _loci(tables)]),
+        *([_controller(tables)] if len(tables["controller"]) else []),
         " ".join([*(_result(a, verdict, tables["ladder"]) for a in ("lateral", "forward")), f"Software: {versions()}."]),
     ]
 
@@ -136,6 +140,27 @@ def _loci(tables: Mapping[str, pd.DataFrame]) -> str:
         f"{plural(len(pushes), 'push')} ({marked} marked, {len(pushes) - marked} found in the data) were masked; "
         f"{plural(len(loci), 'locus')} followed."
     )
+
+
+def _controller(tables: Mapping[str, pd.DataFrame]) -> str:
+    gains, trust = tables["clusters"]["gains"], tables["trust"]
+    said = (
+        "The law xZ = d + k1 (x - d) + k2 x' within the limits of the ZMP (Murai et al. 2013) was identified from the loci of one subject, "
+        "task and condition together, lateral axis, unfiltered. Frames at the left limit, inside and at the right limit were told apart by "
+        "change points, any number per locus, with noise pooled over the loci"
+    )
+    said += "; switches that a person had marked override them. " if trust["mark"].notna().any() else ". "
+    said += (
+        "Beside them stands the rule of Murai et al. made numeric: recursive least squares runs forward along a locus and returns from "
+        "its end, and another law begins where the returning estimate begins to stray. Loci were clustered by \u03c9; the number of "
+        "clusters is the one that predicts loci left out. d, k1 and k2 were estimated by output error (Ljung 1999, section 7.3), that is, "
+        "such that the simulated closed loop follows the measured CoM, from the loci that do not fall; limits are means of the ZMP at them"
+        ", left and right apart. 95 % intervals are clustered by locus (Liang and Zeger 1986; t distribution)."
+    )
+    found = results(tables["controller"])
+    if not found:
+        return f"{said} The gains could not be told."
+    return f"{said} {int(gains.sum())} of {plural(len(gains), 'locus')} were used for the gains. Found: {'; '.join(found)}."
 
 
 def _result(axis: str, verdict: Mapping[str, Any], ladder: pd.DataFrame) -> str:

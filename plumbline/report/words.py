@@ -88,5 +88,5 @@ def counts(tables: Mapping[str, pd.DataFrame]) -> str:
 
 def plural(count: int, what: str) -> str:
     """Count and noun."""
-    many = {"locus": "loci", "push": "pushes"}.get(what, what + "s")
+    many = {"locus": "loci", "push": "pushes", "switch": "switches"}.get(what, what + "s")
     return f"{count:,} {what if count == 1 else many}".replace(",", "\u202f")

@@ -43,6 +43,53 @@ rule loci_figure:
         "../../scripts/figure.py"
 
 
+rule trust_figure:
+    input:
+        trust="results/trust/{part}.parquet",
+        rls="results/rls/{part}.parquet",
+        signals="results/signals/{part}.parquet",
+        loci="results/loci/{part}.parquet",
+        clusters="results/clusters/{part}.parquet",
+        controller="results/controller/{part}.parquet",
+    output:
+        report(
+            "results/trust/_{part}.svg",
+            caption="../report/trust.rst",
+            category="Controller",
+            labels={"figure": "Regimes and returning RLS", "part": "{part}"},
+        ),
+    log:
+        "results/logs/trust_figure/{part}.log",
+    params:
+        code=code("figure.py", "figures/trust.py"),
+        config={},
+        figure="trust",
+    script:
+        "../../scripts/figure.py"
+
+
+rule clusters_figure:
+    input:
+        clusters="results/clusters/{part}.parquet",
+        choice="results/choice/{part}.parquet",
+        controller="results/controller/{part}.parquet",
+    output:
+        report(
+            "results/clusters/_{part}.svg",
+            caption="../report/clusters.rst",
+            category="Controller",
+            labels={"figure": "Clusters of omega and gains", "part": "{part}"},
+        ),
+    log:
+        "results/logs/clusters_figure/{part}.log",
+    params:
+        code=code("figure.py", "figures/clusters.py"),
+        config={},
+        figure="clusters",
+    script:
+        "../../scripts/figure.py"
+
+
 rule fit_figure:
     input:
         fit="results/fit/{part}.parquet",

@@ -1,0 +1,1 @@
+"""What only this study needs: its numbers beside the paper's, its portraits and figures."""
