@@ -155,6 +155,8 @@ def _controllers(
         group = next(of_loci(signals, pushes, wanted, {key: plant.omega}), None)
         _note(table, group)
         yield from _rows(about | {"cluster": cluster}, plant, group, _regimes(group, trust))
+    between = ~table["gains"] & (table["note"] == "") & (table["share"] < SURE)
+    table.loc[between, "note"] = "its omega could be that of another cluster"
 
 
 def _note(table: pd.DataFrame, group: Group | None) -> None:
