@@ -141,7 +141,13 @@ def _controllers(
     trust: pd.DataFrame,
 ) -> Iterator[dict[str, Any]]:
     """Rows of `controller` for one group; sets `gains` and `note` in `table`."""
+    table.loc[table["kind"] == "falling", "note"] = "falls: its ZMP only shows the limit"
     numbers = sorted(set(table["cluster"]) - {0})
+    key = (about["subject"], about["task"], about["condition"])
+    pooled = plant_of(weak)
+    everybody = next(of_loci(signals, pushes, loci, {key: pooled.omega}), None) if pooled is not None and pooled.w2 > 0 else None
+    regime = _regimes(everybody, trust)
+    known = laws.limits(everybody.batch, regime) if everybody is not None and regime is not None else None
     for cluster in numbers if len(numbers) > 1 else [0]:  # gains over loci of several omegas are nobody's
         mine = table if cluster == 0 else table[table["cluster"] == cluster]
         sure = mine[mine["share"] >= SURE]
@@ -151,23 +157,23 @@ def _controllers(
             yield _blank(about | {"cluster": cluster}) | {"warning": "omega cannot be told from these loci, so neither can the gains"}
             continue
         wanted = loci.merge(mine[["trial", "locus"]], on=["trial", "locus"])
-        key = (about["subject"], about["task"], about["condition"])
         group = next(of_loci(signals, pushes, wanted, {key: plant.omega}), None)
-        _note(table, group)
-        yield from _rows(about | {"cluster": cluster}, plant, group, _regimes(group, trust))
+        rows = list(_rows(about | {"cluster": cluster}, plant, group, _regimes(group, trust), known))
+        _note(table, mine.index, group, identified=len(rows) > 1)
+        yield from rows
     between = ~table["gains"] & (table["note"] == "") & (table["share"] < SURE)
     table.loc[between, "note"] = "its omega could be that of another cluster"
 
 
-def _note(table: pd.DataFrame, group: Group | None) -> None:
-    """Say of each locus whether it was used for the gains."""
-    table.loc[table["kind"] == "falling", "note"] = "falls: its ZMP only shows the limit"
-    if group is None:
-        table.loc[table["note"] == "", "note"] = "no locus of its group has an unbroken CoM and ZMP"
+def _note(table: pd.DataFrame, mine: pd.Index, group: Group | None, *, identified: bool) -> None:
+    """Say of each locus of a cluster (mine: rows of the table) whether it was used for the gains."""
+    rows = table.loc[mine]
+    if group is None or not identified:
+        table.loc[mine[(rows["note"] == "") & (rows["kind"] != "falling")], "note"] = "the gains cannot be told from these loci"
         return
     steady = group.loci[group.steady]
     used = set(zip(steady["trial"], steady["locus"], strict=True))
-    table["gains"] |= np.array([key in used for key in zip(table["trial"], table["locus"], strict=True)])
+    table.loc[mine, "gains"] = [pair in used for pair in zip(rows["trial"], rows["locus"], strict=True)]
     short = [(group.loci.iloc[j], why) for j, why in enumerate(group.shortened) if why]
     for locus, why in [*group.left_out, *short]:
         table.loc[(table["trial"] == locus["trial"]) & (table["locus"] == locus["locus"]), "note"] = why
@@ -195,14 +201,16 @@ def _blank(about: dict[str, Any]) -> dict[str, Any]:
     return row | about | {"method": "output error"}
 
 
-def _rows(about: dict[str, Any], plant: PlantFit, group: Group | None, regime: NDArray[np.int8] | None) -> Iterator[dict[str, Any]]:
+def _rows(
+    about: dict[str, Any], plant: PlantFit, group: Group | None, regime: NDArray[np.int8] | None, known: laws.Limits | None
+) -> Iterator[dict[str, Any]]:
     """One row per method."""
     low, high = plant.omega_interval()
     base = _blank(about) | {"omega": plant.omega, "omega_low": low, "omega_high": high}
     count = int(group.steady.sum()) if group is not None else 0
     got = None
     if group is not None and regime is not None and count >= FEWEST:
-        got = laws.identify(group.batch, regime, plant.omega, group.steady)
+        got = laws.identify(group.batch, regime, plant.omega, group.steady, known=known)
     if got is None:
         said = f"{count} loci do not fall and have an unbroken CoM and ZMP; {FEWEST} are needed"
         yield base | {"loci": count, "warning": said if count < FEWEST else "the gains cannot be told from these loci"}

@@ -5,6 +5,7 @@ the consistent law, because a gain that is 3 % too small moves a switch by some 
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,18 +118,36 @@ def _late(plain: OutputError, delayed: OutputError | None) -> bool:
     return bool(low > SHORTEST and delayed.misfit < (1 - MATTERS) * plain.misfit)
 
 
-def identify(batch: Batch, regime: Regime, omega: float, steady: Mask, *, delay: bool = True) -> Controller | None:
+class Limits(NamedTuple):
+    """Left and right limit of the ZMP [m], infinite where never reached; standard errors clustered by locus [m]; loci at each."""
+
+    left: float
+    right: float
+    se: tuple[float, float]
+    loci: tuple[int, int]
+
+
+def limits(batch: Batch, regime: Regime) -> Limits:
+    """Mean ZMP over the frames at each limit, over all loci of a batch: limits belong to the feet, not to a cluster of omega."""
+    law = switching.limits(regime, batch, Law(0.0, 0.0, 0.0))
+    found = [_limit_se(batch, regime, side, value) for side, value in ((-1, law.left), (1, law.right))]
+    return Limits(law.left, law.right, (found[0][0], found[1][0]), (found[0][1], found[1][1]))
+
+
+def identify(
+    batch: Batch, regime: Regime, omega: float, steady: Mask, *, delay: bool = True, known: Limits | None = None
+) -> Controller | None:
     """Limits from all loci and gains by each method from those that do not fall (steady, (m,)), for known regimes and omega.
 
-    delay: look for one too (three quarters of the time).  None where the gains cannot be told.
+    delay: look for one too (three quarters of the time).  known: limits of more loci than these.  None where the gains cannot be told.
     """
     least = saturation.fit(batch.take(steady)) if steady.any() else None
     if least is None or not np.isfinite(least.law.d):
         return None
-    start = switching.limits(regime, batch, least.law)
+    borders = known or limits(batch, regime)
+    start = least.law._replace(left=borders.left, right=borders.right)
     coarse, thin = thinned(batch.take(steady), regime[:, steady])
     plain = output_error.fit(coarse, thin, start, omega)
-    errors = [_limit_se(batch, regime, side, limit) for side, limit in ((-1, start.left), (1, start.right))]
     delayed = output_error.search(coarse, thin, plain.law, omega) if delay else None
     law = delayed.law if delayed is not None and _late(plain, delayed) else plain.law
     return Controller(
@@ -136,8 +155,8 @@ def identify(batch: Batch, regime: Regime, omega: float, steady: Mask, *, delay:
         plain,
         delayed,
         instruments.fit(coarse, thin, law, omega, least.inside_rms),
-        (errors[0][0], errors[1][0]),
-        (errors[0][1], errors[1][1]),
+        borders.se,
+        borders.loci,
     )
 
 

@@ -7,10 +7,14 @@ hold the noise pooled over all loci and a covariance inflated by the noise's cor
 
 .. math:: z_k = \frac{\overline{p_k - \varphi_k \hat\theta_{k+g}}}{s\,\sqrt{1 + 2 \tau f\, \varphi_k S_{k+g}^{-1} \varphi_k^T}}
 
-For a locus that begins inside the limits and leaves (falling) the order is reversed.
+For a locus that begins inside the limits and leaves (falling) the order is reversed. The passes shown are the paper's (returning from
+theta_F[N] with P0 reset large). The passes that decide start from the group's law with a narrow prior instead: from a single locus the
+three parameters are known too badly near its quiet end, and before a fall the law is seen for some hundredths of a second. The rule
+gives one switch per locus at most, and none where the law never asks for three standard deviations more than the limit gives.
 """
 
 import json
+import warnings
 from collections.abc import Mapping, Sequence
 from itertools import combinations_with_replacement
 from typing import Any, NamedTuple
@@ -39,7 +43,6 @@ VARIES = 0.1  # share by which the gains of one locus may leave those of the gro
 DRIFTS = 5e-3  # [m] by which its reference may
 STRAYS = 3.0  # standard deviations
 CALM = 1.0  # the stray began where the statistic was last below this
-NEAR = 0.25  # [s] a person's mark belongs to the nearest switch of its locus within this, else to the nearest of all
 FILTER_TIME = 0.1  # [s] over which the low-passed signals hang together
 NAMES = np.array(["left", "inside", "right"])
 
@@ -86,7 +89,11 @@ def _parts(group: Group, j: int, regime: Regime, by_rls: float, marks: Sequence[
     last = group.starts[j] + (len(rows) - 1) / batch.rate
     found = group.starts[j] + (np.flatnonzero(np.diff(rows)) + 0.5) / batch.rate
     names = NAMES[rows[np.concatenate([[0], np.flatnonzero(np.diff(rows)) + 1])] + 1]
-    mark = _marks(found, [m for m in marks if locus["start"] <= m <= locus["end"]])
+    within = [m for m in marks if locus["start"] <= m <= locus["end"]]
+    mark = _marks(found, within)
+    if lost := sorted(set(within) - set(mark)):
+        said = ", ".join(f"{m:.3f}" for m in lost)
+        warnings.warn(f"{locus['trial']}, locus {locus['locus']}: no switch was found for the mark at {said} s", stacklevel=2)
     begin = np.concatenate([[group.starts[j]], np.where(np.isfinite(mark), mark, found)])
     begin = np.maximum.accumulate(begin)
     end = np.concatenate([begin[1:], [last]])
@@ -110,12 +117,24 @@ def _parts(group: Group, j: int, regime: Regime, by_rls: float, marks: Sequence[
 
 
 def _marks(found: Array, marks: Sequence[float]) -> Array:
-    """The person's mark of each switch found [s], NaN where none; each mark goes to the nearest switch that has no nearer mark."""
+    """The person's mark of each switch found [s], NaN where none, in the order of time and as near as that allows.
+
+    Every switch takes at most one mark; of more marks than switches the farthest are left over.
+    """
+    given = np.sort(np.asarray(marks, dtype=float))
+    if len(given) > len(found):
+        nearest = np.abs(given[:, None] - found).min(1) if len(found) else np.zeros(len(given))
+        given = np.sort(given[np.argsort(nearest, kind="stable")[: len(found)]])
     out = np.full(len(found), np.nan)
-    for mark in sorted(marks, key=lambda m: float(np.min(np.abs(found - m))) if len(found) else 0.0):
-        free = np.flatnonzero(np.isnan(out))
-        if len(free):
-            out[free[np.argmin(np.abs(found[free] - mark))]] = mark
+    best: list[tuple[float, tuple[int, ...]]] = [(0.0, ())]  # cheapest way to give the first k marks, switches in ascending order
+    for mark in given:
+        best = [
+            min((cost + abs(float(found[j]) - float(mark)), (*used, j)) for cost, used in best if not used or j > used[-1])
+            for j in range(len(found))
+            if any(not used or j > used[-1] for _, used in best)
+        ]
+    if len(given):
+        out[list(min(best)[1])] = given
     return out
 
 

@@ -108,3 +108,21 @@ def test_a_study_without_loci_has_empty_tables(study: tuple[pd.DataFrame, ...]) 
     parts, traces = trust.of_part(signals, pushes, tables.empty("loci"), coverage, trials, WEAK)
     assert len(parts) == len(traces) == 0
     assert set(parts.columns) == {c.name for c in tables.TABLES["trust"]}
+
+
+def test_marks_keep_the_order_of_time() -> None:
+    """Marks never cross, each switch takes at most one, and surplus marks are the farthest ones."""
+    found = np.array([1.0, 2.0])
+    np.testing.assert_array_equal(trust._marks(found, [2.2, 2.05]), [2.05, 2.2])
+    np.testing.assert_array_equal(trust._marks(found, [1.9]), [np.nan, 1.9])
+    np.testing.assert_array_equal(trust._marks(found[:1], [3.0, 1.2]), [1.2])
+    assert len(trust._marks(found[:0], [1.0])) == 0
+
+
+def test_a_mark_without_a_switch_is_said(study: tuple[pd.DataFrame, ...]) -> None:
+    """More marks than switches: the log names the trial and the instants that were not used."""
+    signals, pushes, loci, coverage, trials = study
+    marked = trials.copy()
+    marked.loc[0, "events"] = json.dumps([[0.1 * k + 0.2, 0.0, "switch"] for k in range(20)])
+    with pytest.warns(UserWarning, match=r"run-000, locus 1: no switch was found for the mark at"):
+        trust.of_part(signals, pushes, loci, coverage, marked, WEAK)

@@ -34,7 +34,8 @@ class Instruments(NamedTuple):
 def fit(batch: Batch, regime: Regime, start: Law, omega: float, feedback_sd: float) -> Instruments | None:
     """One step of instrumental variables from a law that is good enough to simulate.
 
-    start: its delay is kept.  feedback_sd: rms of p - law inside [m].  None where fewer than 20 frames are well inside.
+    start: its delay is kept.  feedback_sd: rms of p - law inside [m].  None where fewer than 20 frames are well inside or the
+    instruments cannot tell the gains.
     """
     point = np.array([[start.d], [start.k1], [start.k2], [start.delay]])
     dx = output_error.simulate(point, batch, regime, omega, (start.left, start.right))[0, :, 0]
@@ -49,9 +50,13 @@ def fit(batch: Batch, regime: Regime, start: Law, omega: float, feedback_sd: flo
     zeta, phi = (np.stack([one, motion.x, motion.v]) * chosen for motion in (free, seen))
     normals = np.einsum("inm,jnm->mij", zeta, phi)[chosen.any(0)]
     normal = normals.sum(0)
+    if np.linalg.cond(normal / np.sqrt(np.outer(np.diag(normal), np.diag(normal)).clip(1e-300))) > 1e8:
+        return None
     c, k1, k2 = np.linalg.solve(normal, np.einsum("inm,nm->i", zeta, batch.p))
     error = batch.p - np.tensordot([c, k1, k2], phi, 1)
     scores = np.einsum("inm,nm->mi", zeta, np.where(chosen, error, 0.0))[chosen.any(0)]
+    if abs(1 - k1) < 1e-6:
+        return None
     d = c / (1 - k1)
     to_d = np.array([[1 / (1 - k1), d / (1 - k1), 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])  # (c, k1, k2) -> (d, k1, k2)
     law = start._replace(d=float(d), k1=float(k1), k2=float(k2))

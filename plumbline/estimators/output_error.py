@@ -143,7 +143,11 @@ def _certified(
     law = Law(float(theta[0]), float(theta[1]), float(theta[2]), *limits, delay=float(theta[3]))
     size = float(np.sqrt(np.sum(error[0] ** 2) / batch.inside.sum()) * scale[0, 0, 0])
     fit = float(np.prod(scale))
-    return OutputError(law, jackknife(normals, scores), size, fit, error.shape[2], converged)
+    covariance = jackknife(normals, scores)
+    if count > 3 and theta[3] == 0:  # at its bound: the gains are those without a delay, the delay's own interval is one-sided
+        covariance[:3, :3] = jackknife(normals[:, :3, :3], scores[:, :3])
+        covariance[3, :3] = covariance[:3, 3] = 0.0
+    return OutputError(law, covariance, size, fit, error.shape[2], converged)
 
 
 def simulate(points: Array, batch: Batch, regime: Regime, omega: float, limits: tuple[float, float]) -> Array:
