@@ -76,7 +76,7 @@ def _first(batch: Batch) -> tuple[Saturation | None, float]:
     Equation error sees a delay nearly everywhere; to tell who is at a limit it does not matter whether it is one.
     """
     coarse = batch.thinned(SIMULATED)
-    fits = [(float(g), saturation.fit(coarse.late(float(g)))) for g in np.arange(0.0, output_error.LONGEST, output_error.GRID)]
+    fits = [(float(g), saturation.fit(coarse.late(float(g)))) for g in np.arange(0.0, output_error.LONGEST, 2 * output_error.GRID)]
     cost = [got.cost if got is not None else np.inf for _, got in fits]
     best = int(np.argmin(cost))
     delay = fits[best][0] if cost[best] < (1 - SHOWS) * cost[0] else 0.0

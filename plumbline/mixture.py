@@ -68,7 +68,7 @@ def fit(value: Array, se: Array, number: int) -> Mixture:
         between = max(mixture.between + slope / np.sum(1 / variance**2), 0.0)
         moved = np.max(np.abs(centre - mixture.centre))
         mixture = Mixture(centre, np.maximum(weight.mean(0), 1e-6), float(between))
-        if moved < 1e-9 * np.ptp(value):
+        if moved < 1e-6 * np.ptp(value):
             break
     order = np.argsort(mixture.centre)
     return Mixture(mixture.centre[order], mixture.share[order], mixture.between)
