@@ -61,6 +61,6 @@ def _loci(axes: Axes, loci: pd.DataFrame, cluster: int, low: float, high: float)
 def _keys(found: pd.DataFrame) -> list[Line2D]:
     return [
         Line2D([], [], color=TINTS[(int(r.cluster) - 1) % len(TINTS)], marker=MARKS[(int(r.cluster) - 1) % len(MARKS)], lw=1.1, ms=4,
-               label=rf"cluster {r.cluster}: $\omega$ = {r.omega:.3f} [{r.omega_low:.3f}, {r.omega_high:.3f}] rad/s; gains from {r.loci} loci")
+               label=rf"cluster {r.cluster}: $\omega$ = {r.omega:.3f} [{r.omega_low:.3f}, {r.omega_high:.3f}] rad/s; gains: {r.loci} loci")
         for r in s.rows(found)
     ]  # fmt: skip
