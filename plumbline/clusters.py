@@ -154,6 +154,7 @@ def _controllers(
         mine = sure if len(sure) >= FEWEST else mine
         plant = plant_of(weak, set(zip(mine["trial"], mine["locus"], strict=True)))
         if plant is None or plant.w2 <= 0:
+            _note(table, mine.index, None, identified=False)
             yield _blank(about | {"cluster": cluster}) | {"warning": "omega cannot be told from these loci, so neither can the gains"}
             continue
         wanted = loci.merge(mine[["trial", "locus"]], on=["trial", "locus"])

@@ -42,11 +42,6 @@ class Group:
         """Loci that do not fall, shape (m,)."""
         return (self.loci["kind"] != "falling").to_numpy()
 
-    @property
-    def about(self) -> dict[str, str]:
-        """What the group is called in tables."""
-        return {"subject": self.subject, "task": self.task, "condition": self.condition}
-
 
 def of_loci(signals: pd.DataFrame, pushes: pd.DataFrame, loci: pd.DataFrame, omega: dict[tuple[str, str, str], float]) -> Iterator[Group]:
     """Groups of whole subjects.
@@ -107,6 +102,7 @@ class _Motion:
 
     @classmethod
     def of(cls, table: pd.DataFrame) -> "_Motion":
+        """Of a trial's rows of `signals`."""
         time, x, p = (table[c].to_numpy(float) for c in ("time", "com_x", "zmp_x"))
         return cls(time, x, p, sampling_rate(time))
 

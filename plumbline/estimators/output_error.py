@@ -57,7 +57,7 @@ def fit(batch: Batch, regime: Regime, start: Law, omega: float, *, delayed: bool
     limits = (start.left, start.right)
     count = 4 if delayed else 3
     scale = _scale(simulate(theta[:, None], batch, regime, omega, limits)[:, :, 0], batch)
-    theta, converged = _descend(theta, count, scale, batch, regime, omega, limits)
+    theta, _ = _descend(theta, count, scale, batch, regime, omega, limits)
     scale = _scale(simulate(theta[:, None], batch, regime, omega, limits)[:, :, 0], batch)
     theta, converged = _descend(theta, count, scale, batch, regime, omega, limits)
     return _certified(theta, count, scale, batch, regime, omega, limits, converged)
@@ -141,13 +141,12 @@ def _certified(
     normals = np.einsum("iynm,jynm->mij", slopes, slopes)
     scores = np.einsum("iynm,ynm->mi", slopes, error)
     law = Law(float(theta[0]), float(theta[1]), float(theta[2]), *limits, delay=float(theta[3]))
-    size = float(np.sqrt(np.sum(error[0] ** 2) / batch.inside.sum()) * scale[0, 0, 0])
-    fit = float(np.prod(scale))
+    rms = _scale(error * scale, batch)  # at the minimum, not where its scale was taken
     covariance = jackknife(normals, scores)
     if count > 3 and theta[3] == 0:  # at its bound: the gains are those without a delay, the delay's own interval is one-sided
         covariance[:3, :3] = jackknife(normals[:, :3, :3], scores[:, :3])
         covariance[3, :3] = covariance[:3, 3] = 0.0
-    return OutputError(law, covariance, size, fit, error.shape[2], converged)
+    return OutputError(law, covariance, float(rms[0, 0, 0]), float(np.prod(rms)), error.shape[2], converged)
 
 
 def simulate(points: Array, batch: Batch, regime: Regime, omega: float, limits: tuple[float, float]) -> Array:
