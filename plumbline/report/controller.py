@@ -199,7 +199,7 @@ def _methods(controller: pd.DataFrame) -> Sheet:
     rows = _named(rows).assign(called=rows["method"].map(METHODS), off=1e3 * rows["error"])
     columns = WHO | {
         "called": ("method", text), "k1_said": ("k1", text), "k2_said": ("k2 [s]", text), "reference_said": ("reference d [mm]", text),
-        "off": ("simulated CoM off by, rms [mm]", significant),
+        "off": ("simulated CoM off by, rms in sample [mm]", significant),
     }  # fmt: skip
     made = sheet(rows, columns, "controller", "No gains by any method: the warnings above say why.")
     si = controller.iloc[:MOST]

@@ -154,8 +154,9 @@ def _controller(tables: Mapping[str, pd.DataFrame]) -> str:
         "Beside them stands the rule of Murai et al. made numeric: recursive least squares runs forward along a locus and returns from "
         "its end, and another law begins where the returning estimate begins to stray. Loci were clustered by \u03c9; the number of "
         "clusters is the one that predicts loci left out. d, k1 and k2 were estimated by output error (Ljung 1999, section 7.3), that is, "
-        "such that the simulated closed loop follows the measured CoM, from the loci that do not fall; limits are means of the ZMP at them"
-        ", left and right apart. 95 % intervals are clustered by locus (Liang and Zeger 1986; t distribution)."
+        "such that the simulated closed loop follows the measured CoM and ZMP, from the loci that do not fall; "
+        "limits are means of the ZMP at them"
+        ", left and right apart. 95 % intervals leave out locus by locus (jackknife; t distribution) and take ω as known."
     )
     found = results(tables["controller"])
     if not found:
