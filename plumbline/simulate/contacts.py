@@ -1,11 +1,12 @@
 """Forces on the body that no plate measures: hands that push, hands that guide, springs.
 
-A contact gives a lateral force [N] and the height [m] at which it acts, from the time and from where the body is. New kinds
-(walls, periodic forces, ...) are new classes with the same method.
+A contact gives its force [N] and the line along which it acts [m], from the time and from where the body is. New kinds (walls,
+periodic forces, ...) are new classes with the same method, or a `Field`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
@@ -30,11 +31,20 @@ class Where(NamedTuple):
     hand_height: Array
 
 
+class Pull(NamedTuple):
+    """A force on the body: lateral [N] at a height [m], and up [N] at a lateral place [m]."""
+
+    lateral: Array
+    height: Array | float
+    up: Array | float = 0.0
+    place: Array | float = 0.0
+
+
 class Contact(Protocol):
     """One unmeasured force."""
 
-    def force(self, at: Where) -> tuple[Array, Array | float]:
-        """Lateral force [N] and height [m]."""
+    def force(self, at: Where) -> Pull:
+        """Force and where it acts."""
 
 
 class Push(NamedTuple):
@@ -64,7 +74,7 @@ class Hands:
         most = max((len(p) for p in plans), default=0)
         self.slots = [[plan[i] if i < len(plan) else Push(0.0, 1.0, 0.0) for plan in plans] for i in range(most)]
 
-    def force(self, at: Where) -> tuple[Array, Array | float]:
+    def force(self, at: Where) -> Pull:
         """Sum over the touches of each trial [N], at the height of the hand on the trunk [m]."""
         total = np.zeros_like(at.com)
         for slot in self.slots:
@@ -73,7 +83,7 @@ class Hands:
             on = (s > 0) & (s < 1)
             if on.any():
                 total = total + np.where(on, _touch(slot, s, at), 0.0)
-        return total, at.hand_height
+        return Pull(total, at.hand_height)
 
 
 def _touch(slot: list[Touch], s: Array, at: Where) -> Array:
@@ -102,6 +112,44 @@ class Spring:
     place: float  # [m]
     height: float  # [m]
 
-    def force(self, at: Where) -> tuple[Array, Array | float]:
-        """Lateral force [N] and height [m]."""
-        return -self.stiffness * (at.com - self.place), self.height
+    def force(self, at: Where) -> Pull:
+        """Force and where it acts."""
+        return Pull(-self.stiffness * (at.com - self.place), self.height)
+
+
+@dataclass(frozen=True)
+class Field:
+    """A lateral force that is a function of time and of where the CoM is, at a height [m].
+
+    law: (time [s], x [m], x' [m/s]) -> [N]; arrays that broadcast to (n, t).
+    """
+
+    law: Callable[[Array, Array, Array], Array]
+    height: float
+
+    def force(self, at: Where) -> Pull:
+        """Force and where it acts."""
+        return Pull(self.law(at.time, at.com, at.com_rate), self.height)
+
+
+@dataclass(frozen=True)
+class Leaning:
+    """Somebody leans on something for a while, or is held: a force that rises, stays and goes, in each trial at its own time.
+
+    onset: [s], (t,).  duration: [s].  lateral: [N] at `height` [m].  up: [N] at `place` [m].  edge: of the rise and the fall [s].
+    """
+
+    onset: Array
+    duration: float
+    lateral: float
+    height: float
+    up: float = 0.0
+    place: float = 0.0
+    edge: float = 0.4
+
+    def force(self, at: Where) -> Pull:
+        """Force and where it acts."""
+        since = at.time - self.onset
+        s = np.clip(np.minimum(since, self.duration - since) / self.edge, 0.0, 1.0)
+        share = s**3 * (10 - 15 * s + 6 * s**2) + 0 * at.com
+        return Pull(self.lateral * share, self.height, self.up * share, self.place)

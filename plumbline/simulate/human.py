@@ -8,7 +8,7 @@ links CoM and ZMP is used anywhere.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ import numpy as np
 from plumbline.physics import G
 from plumbline.simulate import hidden, records
 from plumbline.simulate.contacts import Hands, Lean, Push, Spring, Touch
-from plumbline.simulate.control import Controller, Law, motor_noise
+from plumbline.simulate.control import Controller, Law, motor_noise, together
 from plumbline.simulate.jets import Array
 from plumbline.simulate.mechanics import body
 from plumbline.simulate.motion import FALLEN, STEP, WARM, State, World, integrate
@@ -61,46 +61,49 @@ def simulate(
     force_rate: float = 1000.0,
     marker_noise: float = 0.7e-3,
     force_noise: float = 1.0,
-    controller: Controller | None = None,
-    habits: Habits | None = None,
+    controller: Controller | Sequence[Controller] | None = None,
+    habits: Habits | Sequence[Habits] | None = None,
     touches: Sequence[Sequence[Touch]] | None = None,
 ) -> list[SimulatedTrial]:
     """`trials` recordings of each subject, in the order of the subjects; all are simulated at once.
 
     duration: [s], less where somebody falls.  effects: name -> sizes, see `hidden.EFFECTS`.  rate, force_rate: [Hz].
-    marker_noise [m], force_noise [N]: white, sd per coordinate and channel.  habits: prescribed motions of everybody.
+    marker_noise [m], force_noise [N]: white, sd per coordinate and channel.  controller: everybody's, or one per subject that differ
+    in their laws.  habits: prescribed motions of everybody, or one per subject that differ in `follow`.
     touches: pushes of each trial in order; drawn by `draw_touches` where not given.  Raises ValueError for limits that do not lie
     under the feet, for unknown effects, and where `touches` has another length than there are trials.
     """
     people = [subjects] if isinstance(subjects, Subject) else list(subjects)
     who = [(i, run) for i in range(len(people)) for run in range(1, trials + 1)]
     cast = [people[i] for i, _ in who]
-    setup = hidden.Setup(len(who), np.random.default_rng([seed, 0]), habits or Habits(), controller or Controller())
+    given = [controller or Controller()] if controller is None or isinstance(controller, Controller) else list(controller)
+    setup = hidden.Setup(len(who), np.random.default_rng([seed, 0]), _habits(habits, who), given[0], duration)
     hidden.apply(setup, effects or {})
-    _check(cast, setup.controller)
-    if touches is None:
-        plans = [draw_touches(people[i], setup.controller, run, duration, [seed, i, run]) for i, run in who]
-    else:
-        plans = [list(plan) for plan in touches]
-        if len(plans) != len(who):
-            raise ValueError(f"touches has {len(plans)} lists for {len(who)} trials; give one list per trial")
+    own = [replace(setup.controller, lateral=c.lateral, forward=c.forward) for c in (given if len(given) > 1 else given * len(people))]
+    _check(people, own)
+    plans = _plans(people, own, who, duration, seed) if touches is None else [list(plan) for plan in touches]
+    if len(plans) != len(who):
+        raise ValueError(f"touches has {len(plans)} lists for {len(who)} trials; give one list per trial")
+    setup.controller = together([own[i] for i, _ in who])
     world = World(body(cast, setup.habits), (Hands(plans), *setup.contacts), setup.controller)
-    motion = _live(world, cast, setup, duration, [np.random.default_rng([seed, i, run, 1]) for i, run in who])
-    lab = _Lab(rate, force_rate, marker_noise, force_noise, setup.force_late, setup.spoil_plates)
+    minds = [(own[i], [np.random.default_rng([seed, i, run, 1]) for run in range(1, trials + 1)]) for i in range(len(people))]
+    motion = _live(world, cast, setup.habits, duration, minds)
+    lab = _Lab(rate, force_rate, marker_noise, force_noise, setup.force_late, setup.spoil_plates, setup.spoil_markers)
     rngs = [np.random.default_rng([seed, i, run, 2]) for i, run in who]
     return lab.record(records.Lived(world, cast, setup.habits, motion), plans, [run for _, run in who], duration, rngs)
 
 
 @dataclass(frozen=True)
 class _Lab:
-    """The laboratory: rates [Hz] and noise [m, N] of markers and plates, lateness [s] and faults of the plates."""
+    """The laboratory: rates [Hz] and noise [m, N] of markers and plates, lateness [s] of the plates, faults of both."""
 
     rate: float
     force_rate: float
     marker_noise: float
     force_noise: float
     force_late: float
-    faults: list[hidden.Spoil]
+    faults: list[records.PlateFault]
+    marker_faults: list[records.MarkerFault]
 
     def record(
         self,
@@ -119,9 +122,11 @@ class _Lab:
         for j, n in enumerate(_ends(shots["com"][0])):
             k = int(np.searchsorted(samples, n / self.rate - 1e-9))
             spots = {label: place[:, :n, j].T for label, place in places.items()}
+            for fault in self.marker_faults:
+                spots = fault(frames[:n], spots)
             markers = {label: spot + self.marker_noise * rngs[j].standard_normal(spot.shape) for label, spot in spots.items()}
             plates = records.plates(lived.cast[j], samples[:k], ground[:3, :k, j], ground[3:, :k, j])
-            plates = [records.spoilt(p, self.faults, self.force_noise, rngs[j]) for p in plates]
+            plates = records.spoilt(plates, self.faults, self.force_noise, rngs[j])
             truth = _truth(frames[:n], {name: values[:, :n, j] for name, values in shots.items()})
             fell = n < len(frames)
             out.append(SimulatedTrial(lived.cast[j], runs[j], frames[:n], markers, plates, plans[j], fell, truth))
@@ -154,9 +159,23 @@ def draw_touches(subject: Subject, controller: Controller, run: int, duration: f
     return touches
 
 
-def _check(cast: Sequence[Subject], controller: Controller) -> None:
+def _plans(
+    people: Sequence[Subject], controllers: Sequence[Controller], who: Sequence[tuple[int, int]], duration: float, seed: int
+) -> list[list[Touch]]:
+    """Drawn touches of each trial."""
+    return [draw_touches(people[i], controllers[i], run, duration, [seed, i, run]) for i, run in who]
+
+
+def _habits(habits: Habits | Sequence[Habits] | None, who: Sequence[tuple[int, int]]) -> Habits:
+    """One set of habits for all trials, `follow` of each subject's own."""
+    if habits is None or isinstance(habits, Habits):
+        return habits or Habits()
+    return replace(habits[0], follow=np.array([habits[i].follow for i, _ in who]))
+
+
+def _check(people: Sequence[Subject], controllers: Sequence[Controller]) -> None:
     """Limits of the ZMP must lie under the feet, else no foot could carry it."""
-    for s in cast:
+    for s, controller in zip(people, controllers, strict=True):
         for law, low, high in (
             (controller.lateral, -s.reach, s.reach),
             (controller.forward, -s.heel, s.lengths["foot"] - s.heel),
@@ -168,12 +187,18 @@ def _check(cast: Sequence[Subject], controller: Controller) -> None:
                 )
 
 
-def _live(world: World, cast: Sequence[Subject], setup: hidden.Setup, duration: float, rngs: list[np.random.Generator]) -> State:
-    """The motion from `WARM` before the record to its end."""
+def _live(
+    world: World,
+    cast: Sequence[Subject],
+    habits: Habits,
+    duration: float,
+    minds: Sequence[tuple[Controller, list[np.random.Generator]]],
+) -> State:
+    """The motion from `WARM` before the record to its end.  minds: of each subject, with the generators of the trials' motor noise."""
     steps = int(np.ceil((WARM + duration + SPARE) / STEP))
     time = np.asarray(np.arange(steps)[:, None] * STEP - WARM, dtype=np.float64)
-    noise = motor_noise(rngs, setup.controller, steps, STEP)
-    return integrate(world, pack(cast, setup.habits, time), noise, -WARM)
+    noise = np.concatenate([motor_noise(rngs, controller, steps, STEP) for controller, rngs in minds], axis=2)
+    return integrate(world, pack(cast, habits, time), noise, -WARM)
 
 
 def _ends(com_x: Array) -> list[int]:

@@ -59,7 +59,7 @@ class Body:
     second_rest: Array
     push: Array
     curve: float
-    follow: float
+    follow: Array | float
 
 
 def body(subjects: Sequence[Subject], habits: Habits) -> Body:
@@ -185,7 +185,7 @@ def _knees(b: Body, d: Array, vectors: list[Array]) -> None:
 def roll(b: Body, posture: Posture, x: Jet) -> Jet:
     """Roll of the trunk to the right [rad]."""
     own = Jet(posture.roll[0], posture.roll[1], posture.roll[2])
-    return own if b.follow == 0.0 else own.plus(x.scaled(b.follow))
+    return own if not np.any(b.follow) else own.plus(x.scaled(b.follow))
 
 
 def _upper(posture: Posture, angle: Jet, vectors: list[Array]) -> tuple[Array, Array]:

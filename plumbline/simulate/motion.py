@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from plumbline.simulate.contacts import Contact, Where
-from plumbline.simulate.control import Controller, Memory
+from plumbline.simulate.control import Controller, Mind
 from plumbline.simulate.jets import Array, Jet
 from plumbline.simulate.mechanics import Body, Level, com, first_moment, moment, place, roll, wrench
 from plumbline.simulate.posture import Posture, unpack
@@ -38,7 +38,7 @@ class Snapshot(NamedTuple):
     """Everything about the body at n times, arrays (3, n, t).
 
     com [m], com_rate, com_change: CoM.  spin: angular momentum about the CoM [kg m2/s].  ground: ground reaction [N];
-    ground_moment: its moment about the origin [N m].  outside: sum of the contacts' lateral forces [N], outside_moment
+    ground_moment: its moment about the origin [N m].  outside: sum of the contacts' forces [N], outside_moment
     their moment about the origin [N m].  levels: the placement.
     """
 
@@ -85,14 +85,14 @@ def integrate(world: World, table: Array, noise: Array, start: float) -> State:
     Who is more than 1 cm past `FALLEN` is stopped there.
     """
     steps, trials = noise.shape[1:]
-    memory = Memory(world.controller.delay, STEP)
+    mind = Mind(world.controller, STEP)
     q = rest(world.body, table[:, :1], world.controller)
     reference = world.controller.rows("reference")
     now = _Moment(q, 0 * q, 0 * q, reference + 0 * q, 0 * q)
     ahead = now
     out = np.zeros((3, 2, steps, trials))
     for k in range(steps):
-        change, catch_up, x = _solve(world, memory, unpack(table[:, k : k + 1]), ahead, noise[:, k : k + 1], start + k * STEP)
+        change, catch_up, x = _solve(world, mind, unpack(table[:, k : k + 1]), ahead, noise[:, k : k + 1], start + k * STEP)
         moving = np.abs(x) < FALLEN + 0.01
         before = now
         now = _step(now, change * moving, catch_up) if k else now._replace(change=change, catch_up=catch_up)
@@ -119,7 +119,7 @@ def _step(now: _Moment, change: Array, catch_up: Array) -> _Moment:
     return _Moment(place, rate, change, now.zmp + STEP / 2 * (now.catch_up + catch_up), catch_up)
 
 
-def _solve(world: World, memory: Memory, posture: Posture, at: _Moment, noise: Array, time: float) -> tuple[Array, Array, Array]:
+def _solve(world: World, mind: Mind, posture: Posture, at: _Moment, noise: Array, time: float) -> tuple[Array, Array, Array]:
     """Accelerations and the lagging ZMP's rate, (2, 1, t), and the lateral CoM (1, t).
 
     The moment of all forces about the ZMP p = (px, py, 0) has no horizontal part: M - p x F = M_contacts.
@@ -128,12 +128,13 @@ def _solve(world: World, memory: Memory, posture: Posture, at: _Moment, noise: A
     q, v = at.place, at.rate
     levels = place(b, posture, Jet(q[0], v[0], _TRY[0]), Jet(q[1], v[1], _TRY[1]))
     centre, rate = com(b, levels[0]), first_moment(b, levels[1]) / b.mass
-    ask = c.wanted(*memory.seen(centre[:2], rate[:2]), noise)
-    p, catch_up = (at.zmp, (ask - at.zmp) / c.lag) if c.lag > 0 else (ask, np.zeros_like(ask))
+    ask = mind.ask(time, centre[:2], rate[:2], noise)
+    p, catch_up = (c.lagging(at.zmp), (ask - at.zmp) / c.lag) if c.lag > 0 else (ask, np.zeros_like(ask))
     force, turn = wrench(b, levels, centre)
-    _, pull = outside(world, posture, levels, centre, rate, np.array([[time]]))
-    x = turn[:, 0] - p[1] * force[:, 2] - pull[0]
-    y = turn[:, 1] + p[0] * force[:, 2] - pull[1]
+    push, pull = outside(world, posture, levels, centre, rate, np.array([[time]]))
+    load = force[:, 2] - push[2]
+    x = turn[:, 0] - p[1] * load - pull[0]
+    y = turn[:, 1] + p[0] * load - pull[1]
     # both are linear in the accelerations and known at the three tried ones
     xa, xb, ya, yb = x[1] - x[0], x[2] - x[0], y[1] - y[0], y[2] - y[0]
     change = np.stack([xb * y[0] - yb * x[0], ya * x[0] - xa * y[0]]) / (xa * yb - xb * ya)
@@ -152,10 +153,13 @@ def outside(world: World, posture: Posture, levels: tuple[Level, ...], centre: A
     where = Where(time, centre[0], rate[0], aside, aside_rate, hips[2] + up * np.cos(lean.value))
     force, turn = np.zeros_like(centre), np.zeros_like(centre)
     for contact in world.contacts:
-        lateral, height = contact.force(where)
+        lateral, height, up_force, x = contact.force(where)
+        forward = hips[1] + b.push * np.sin(pitch[0])
         force[0] += lateral
-        turn[1] += height * lateral
-        turn[2] -= (hips[1] + b.push * np.sin(pitch[0])) * lateral
+        force[2] += up_force
+        turn[0] += forward * up_force
+        turn[1] += height * lateral - x * up_force
+        turn[2] -= forward * lateral
     return force, turn
 
 

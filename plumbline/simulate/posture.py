@@ -43,7 +43,8 @@ class Habits:
     roll: trunk towards the right [rad].  pitch: trunk forward [rad].  swing: arms, right forward as left goes back [rad].
     sink: pelvis down by knee bending [m], each wave counted from its lowest value, so that it never lengthens the legs.
     curve: pelvis down by `curve` times the square of its distance from the middle [1/m].
-    follow: trunk roll per lateral displacement of the pelvis [rad/m]; 0 keeps the trunk upright while the legs lean.
+    follow: trunk roll per lateral displacement of the pelvis [rad/m]; 0 keeps the trunk upright while the legs lean; may differ between
+    trials, shape (t,).
     """
 
     roll: tuple[Wave, ...] = ()
@@ -51,7 +52,7 @@ class Habits:
     swing: tuple[Wave, ...] = ()
     sink: tuple[Wave, ...] = ()
     curve: float = 0.0
-    follow: float = 0.0
+    follow: Array | float = 0.0
 
 
 class Posture(NamedTuple):

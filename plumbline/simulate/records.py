@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from plumbline.simulate.hidden import Spoil
 from plumbline.simulate.jets import Array, Jet
 from plumbline.simulate.mechanics import roll, turned
 from plumbline.simulate.motion import WARM, Snapshot, State, World, between, snapshot
@@ -49,6 +48,11 @@ class Plate:
         """Corners in the order of the C3D format for a plate whose own axes are right, back, down [m], (4, 3)."""
         w, d = PLATE[0] / 2, PLATE[1] / 2
         return np.asarray(self.centre + np.array([[w, -d, 0], [-w, -d, 0], [-w, d, 0], [w, d, 0]]))
+
+
+#: what a fault of the instruments makes of all plates' records at once, and of all markers (times [s], (n,); label -> [m], (n, 3))
+PlateFault = Callable[[list[Plate]], list[Plate]]
+MarkerFault = Callable[[Array, dict[str, Array]], dict[str, Array]]
 
 
 @dataclass(frozen=True)
@@ -143,10 +147,13 @@ def plates(subject: Subject, time: Array, ground: Array, turn: Array) -> list[Pl
     return out
 
 
-def spoilt(plate: Plate, spoil: Sequence[Spoil], noise: float, rng: np.random.Generator) -> Plate:
-    """The plate's record with its hidden faults and white noise: `noise` [N] on forces, 0.3 m times that on moments."""
-    wrench = np.concatenate([plate.force, plate.moment], axis=1)
-    for fault in spoil:
-        wrench = fault(wrench, plate.centre)
-    wrench = wrench + rng.standard_normal(wrench.shape) * noise * np.array([1, 1, 1, LEVER, LEVER, LEVER])
-    return replace(plate, force=wrench[:, :3], moment=wrench[:, 3:])
+def spoilt(plates: Sequence[Plate], faults: Sequence[PlateFault], noise: float, rng: np.random.Generator) -> list[Plate]:
+    """The plates' records with their hidden faults and white noise: `noise` [N] on forces, 0.3 m times that on moments."""
+    out = list(plates)
+    for fault in faults:
+        out = fault(out)
+    noisy = []
+    for plate in out:
+        white = rng.standard_normal((len(plate.time), 6)) * noise * np.array([1, 1, 1, LEVER, LEVER, LEVER])
+        noisy.append(replace(plate, force=plate.force + white[:, :3], moment=plate.moment + white[:, 3:]))
+    return noisy

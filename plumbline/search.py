@@ -1,0 +1,189 @@
+"""Regressions over sets of effects from sums of products, and the search for the set that predicts trials left out."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plumbline.evidence import Weak
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+FOLDS = 8
+BASE = ("=kinematic", "=moment", "=vertical", "=h")
+"""Columns of every model: a constant in each equation, and h = 1/w2 [s2]."""
+
+
+@dataclass(frozen=True)
+class Sums:
+    """Sums of products of one subject and axis, per independent piece and equation.
+
+    equations: their names.  columns: (effect, number) of each of the P columns, base first.  gram (E, C, P, P), right (E, C, P),
+    square (E, C), count (E, C): over the windows of piece c in equation e.  trial: index of each piece's trial, (C,).  trials: their ids.
+    floor: variance that sensor noise gives, (E, C).  w2: at which the columns were made [1/s2].
+    """
+
+    equations: tuple[str, ...]
+    columns: tuple[tuple[str, int], ...]
+    gram: Array
+    right: Array
+    square: Array
+    count: Array
+    trial: Index
+    trials: tuple[str, ...]
+    floor: Array
+    w2: float
+    mass: float
+
+    def of(self, effects: Iterable[str]) -> Index:
+        """Columns of the base and of some effects."""
+        wanted = {*BASE, *effects}
+        return np.flatnonzero([name in wanted for name, _ in self.columns])
+
+    @property
+    def folds(self) -> Index:
+        """Fold of each piece: whole trials."""
+        return self.trial % min(FOLDS, len(self.trials))
+
+    def error(self, theta: Array, columns: Index, pieces: Array | slice = slice(None)) -> Array:
+        """Sum of squares of each equation over some pieces, (E, c), at coefficients of some columns."""
+        g = self.gram[:, pieces][:, :, columns[:, None], columns]
+        r = self.right[:, pieces][:, :, columns]
+        return np.asarray(self.square[:, pieces] - 2 * r @ theta + np.einsum("ecij,i,j->ec", g, theta, theta))
+
+
+def sums(windows: Sequence[Weak], effects: Sequence[str], w2: float) -> Sums:
+    """Sums of one subject and axis.  effects: those offered; a trial that lacks a term of one has it dropped by the caller.
+
+    w2: of the base model [1/s2].
+    """
+    shear = all(np.isfinite(w.force).all() for w in windows)
+    equations = ("kinematic", "moment", "vertical", "whole") if shear else ("whole",)
+    columns = [(name, 0) for name in BASE]
+    first = windows[0].terms
+    columns += [(name, k) for name in effects for k in range(first[name]["plain"].shape[1])]
+    pieces = [(i, w, c) for i, w in enumerate(windows) for c in np.unique(w.cluster)]
+    size, number, many = len(columns), len(equations), len(pieces)
+    out = {"gram": np.zeros((number, many, size, size)), "right": np.zeros((number, many, size))}
+    square, count, floor = (np.zeros((number, many)) for _ in range(3))
+    at = 0
+    for w in windows:
+        for e, equation in enumerate(equations):
+            x, y = design(w, equation, effects, w2)
+            z = np.column_stack([x, y])
+            noise = w.floor(equation, 1.0 / w2)
+            for k, c in enumerate(np.unique(w.cluster)):
+                part = z[w.cluster == c]
+                products = part.T @ part
+                out["gram"][e, at + k], out["right"][e, at + k] = products[:-1, :-1], products[:-1, -1]
+                square[e, at + k], count[e, at + k], floor[e, at + k] = products[-1, -1], len(part), noise
+        at += len(np.unique(w.cluster))
+    trial = np.array([i for i, _, _ in pieces])
+    names = tuple(w.trial for w in windows)
+    mass = float(np.mean([w.mass for w in windows]))
+    return Sums(equations, tuple(columns), out["gram"], out["right"], square, count, trial, names, floor, w2, mass)
+
+
+def design(w: Weak, equation: str, effects: Sequence[str], w2: float) -> tuple[Array, Array]:
+    """Columns (n, P) and left side (n,) of an equation; kinematic and vertical in m/s2, moment and whole in m."""
+    n = len(w.time)
+    base = np.zeros((n, 4))
+    if equation == "kinematic":
+        base[:, 0] = 1.0
+        parts = [w.terms[name]["force"] for name in effects]
+        return np.column_stack([base, *parts]), w.acceleration - w.force
+    if equation == "vertical":
+        base[:, 2] = 1.0
+        return np.column_stack([base, *(w.terms[name]["vertical"] for name in effects)]), w.vertical
+    base[:, 1] = 1.0
+    base[:, 3] = w.force if equation == "moment" else w.acceleration
+    parts = [-w.terms[name]["plain"] / w2 - w.terms[name]["by_w2"] for name in effects]
+    if equation == "moment":
+        parts = [part + w.terms[name]["force"] / w2 for part, name in zip(parts, effects, strict=True)]
+    return np.column_stack([base, *parts]), w.lever
+
+
+# -- fits -------------------------------------------------------------------------------------------------------------
+
+
+def solve(gram: Array, right: Array) -> Array:
+    """Solutions of many normal equations, (..., s, s) and (..., s); columns scaled to one, a ridge of 1e-9 against exact twins."""
+    scale = np.sqrt(np.einsum("...ii->...i", gram))
+    scale = np.where(scale > 0, scale, 1.0)
+    g = gram / scale[..., :, None] / scale[..., None, :]
+    g = g + 1e-9 * np.eye(gram.shape[-1])
+    return np.asarray(np.linalg.solve(g, (right / scale)[..., None])[..., 0] / scale)
+
+
+def heldout(s: Sums, weight: Array, sets: Sequence[Index]) -> Array:
+    """Sum of squares of each set, equation and piece on folds left out, (S, E, C).
+
+    weight: of each equation (E,), 0 for those that are only looked at.  sets: columns of each model.
+    """
+    fold = s.folds
+    gram = np.einsum("e,ecij->cij", weight, s.gram)
+    right = np.einsum("e,eci->ci", weight, s.right)
+    out = np.empty((len(sets), len(s.equations), len(s.trial)))
+    by_size: dict[int, list[int]] = {}
+    for k, columns in enumerate(sets):
+        by_size.setdefault(len(columns), []).append(k)
+    for f in np.unique(fold):
+        mine, rest = fold == f, fold != f
+        g, r = gram[rest].sum(0), right[rest].sum(0)
+        test_g, test_r = s.gram[:, mine], s.right[:, mine]
+        for members in by_size.values():
+            chosen = np.array([sets[k] for k in members])
+            theta = solve(g[chosen[:, :, None], chosen[:, None, :]], r[chosen])
+            full = np.zeros((len(members), len(s.columns)))
+            np.put_along_axis(full, chosen, theta, 1)
+            cross = np.einsum("eci,ki->kec", test_r, full)
+            power = np.einsum("ki,ecij,kj->kec", full, test_g, full, optimize=True)
+            out[np.ix_(np.array(members), np.arange(len(s.equations)), np.flatnonzero(mine))] = s.square[None, :, mine] - 2 * cross + power
+    return out
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Coefficients of some columns over all pieces, their covariance clustered by trial (by piece below six trials), and its clusters."""
+
+    columns: Index
+    theta: Array
+    covariance: Array
+    clusters: int
+
+    def of(self, s: Sums, effect: str) -> tuple[Array, Array]:
+        """Coefficients of an effect and their covariance."""
+        here = [k for k, c in enumerate(self.columns) if s.columns[c][0] == effect]
+        return self.theta[here], self.covariance[np.ix_(here, here)]
+
+
+def fit(s: Sums, weight: Array, columns: Index, *, among: Array | None = None) -> Fit:
+    """Weighted least squares.  among: pieces used (mask), None for all."""
+    use = np.ones(len(s.trial), bool) if among is None else among
+    gram = np.einsum("e,ecij->cij", weight, s.gram[:, use][:, :, columns[:, None], columns])
+    right = np.einsum("e,eci->ci", weight, s.right[:, use][:, :, columns])
+    theta = solve(gram.sum(0), right.sum(0))
+    scores = right - gram @ theta
+    label = s.trial[use] if len(s.trials) >= 6 else np.flatnonzero(use)
+    groups = np.unique(label)
+    by_group = np.stack([scores[label == k].sum(0) for k in groups])
+    bread = np.linalg.pinv(gram.sum(0), rcond=1e-14, hermitian=True)
+    factor = len(groups) / max(len(groups) - 1, 1)
+    return Fit(columns, theta, factor * bread @ (by_group.T @ by_group) @ bread, len(groups))
+
+
+def residual_variance(s: Sums, weight: Array, columns: Index) -> Array:
+    """Variance of each equation at the fit over all pieces, (E,)."""
+    theta = fit(s, weight, columns).theta
+    return np.asarray(np.maximum(s.error(theta, columns).sum(1), 0.0) / np.maximum(s.count.sum(1), 1))
+
+
+def subsets(names: Sequence[str], most: int, apart: Mapping[str, set[str]]) -> list[tuple[str, ...]]:
+    """Sets of at most `most` names, none with two that look the same (`apart`: name -> its twins)."""
+    out: list[tuple[str, ...]] = [()]
+    for size in range(1, most + 1):
+        out += [c for c in combinations(names, size) if not any(b in apart.get(a, ()) for a, b in combinations(c, 2))]
+    return out
