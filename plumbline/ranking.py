@@ -23,7 +23,9 @@ SHARE = 0.25  # [1] of the noise floor by which it must lower the rms
 SURE = 0.05  # [1] false discovery rate over the catalogue
 TWINS = 0.97  # [1] correlation of what two effects add beyond the base, from which on these data cannot tell them apart
 ABSORBED = 0.995  # [1] share of an effect that the base takes
-LEFT = 1.35  # [1] residual over noise floor above which something is left
+FAULT = 0.005  # [1] of the motion that a segment table and rigid segments leave in any study
+LEFT = 1.35  # [1] residual over noise floor and that, above which something is left
+PLAIN = 2.0  # [1] fall of the score that an effect must bring to be named where something is left that nobody explains
 MODEL = 0.01  # [1] of the paper's error that a model may leave before it is worth a word
 SPARED = 0.3  # [1] of the tolerance that is added before variances are compared
 APART = (("gain", "hand"), ("force_scale", "hand"), ("gain", "com_bias"), ("force_scale", "com_bias"), ("gain", "force_scale"))
@@ -66,7 +68,8 @@ class Finding:
 
     found: effects.  shapes: shapes without a cause that the residual needs.  refused: impostors.  absorbed: effect -> what takes it.
     lacking: effect -> channels that are missing.  base, final: held-out error of the paper's equation and of the last model [m].
-    floor: what sensor noise gives [m], NaN where not known.  over: equation -> residual over its floor.
+    floor: what sensor noise gives [m], NaN where not known.  over: equation -> residual over noise floor and usual faults.
+    left: the equations in which more is left than noise and a model's usual faults explain; empty where the floor is not known.
     """
 
     found: Sequence[Found] = ()
@@ -78,6 +81,7 @@ class Finding:
     final: float = float("nan")
     floor: float = float("nan")
     over: Mapping[str, float] = field(default_factory=dict)
+    left: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -336,12 +340,31 @@ def _enough(need: _Need) -> bool:
 def _finding(case: _Case, members: Set, refused: Sequence[Refused], absorbed: Mapping[str, str], lacking: Mapping[str, str]) -> Finding:
     named = [n for n in members if n not in SHAPES] + [n for n in case.settled if _matters(case, members, n)]
     variance = _variance(case, _errors(case, [members, ()]))
-    floor = _floor(case)
-    over = {e: float(np.sqrt(v) / f) for e, v, f in zip(case.sums[0].equations, variance[0], floor, strict=True)}
+    floor = float(_floor(case)[-1])
+    usual = np.sqrt(_floor(case) ** 2 + (FAULT * _signal(case)) ** 2)
+    over = dict(zip(case.sums[0].equations, (np.sqrt(np.maximum(variance[0], 0.0)) / usual).tolist(), strict=True))
+    decide = [e for e, w, z in zip(over, case.weight, _as_zmp(case), strict=True) if w * z > 0]
+    left = tuple(e for e in decide if over[e] > LEFT)
+    shapes = tuple(n for n in members if n in SHAPES)
+    if left or shapes:  # what nobody explains may look like any effect a little
+        doubtful = [n for n in named if _need(case, members, n).fall < PLAIN]
+        refused = [*refused, *(Refused((n,), float("nan"), "small beside what nobody explains") for n in doubtful)]
+        named = [n for n in named if n not in doubtful]
     return Finding(
-        [_found(case, members, name) for name in named], tuple(n for n in members if n in SHAPES), refused, absorbed, lacking,
-        float(np.sqrt(variance[1, -1])), float(np.sqrt(variance[0, -1])), float(floor[-1]), over,
+        [_found(case, members, name) for name in named], shapes, refused, absorbed, lacking,
+        float(np.sqrt(variance[1, -1])), float(np.sqrt(variance[0, -1])), floor, over, left,
     )  # fmt: skip
+
+
+def _signal(case: _Case) -> Array:
+    """Rms of what each equation is about, (E,): the acceleration of the CoM, or its lever over the ZMP; 0 for the vertical."""
+    s = case.sums[0]
+    count = sum(x.count.sum(1) for x in case.sums)
+    lever = np.sqrt(sum(x.square.sum(1) for x in case.sums) / count)
+    force = np.sqrt(sum(x.gram[:, :, 3, 3].sum(1) for x in case.sums) / count)
+    names = list(s.equations)
+    of = {"kinematic": force[names.index("moment")] if "moment" in names else 0.0, "vertical": 0.0}
+    return np.array([of.get(e, lever[k]) for k, e in enumerate(names)])
 
 
 def _matters(case: _Case, members: Set, name: str) -> bool:
