@@ -127,7 +127,8 @@ def of_one(about: Any, channels: Channels, axis: str, plant: Plant, effects: Map
     key = (about["trial"], about["subject"], about["task"], about["condition"], axis)
     motion = (mean(x), mean(x, bump.slope), mean(channels.zmp_x), mean(x, bump.curvature))
     return Weak(
-        *key, picked, channels.time[picked], plant.cluster[picked], *motion, mean(channels.grf_x) / channels.mass, vertical, channels.mass, plant.height, noise, bump, terms, lacking,
+        *key, picked, channels.time[picked], plant.cluster[picked], *motion,
+        mean(channels.grf_x) / channels.mass, vertical, channels.mass, plant.height, noise, bump, terms, lacking,
     )  # fmt: skip
 
 
