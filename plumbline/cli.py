@@ -79,6 +79,73 @@ def data(folder: Path) -> None:
         raise PlumblineError(f"{folder} holds none of the data sets that studies/ knows")
 
 
+STUDY = click.option(
+    "--study", default=".", type=click.Path(exists=True, file_okay=False, path_type=Path), help="Folder of the study; default: this one."
+)
+
+
+@main.command()
+@click.argument("effect")
+@STUDY
+def add(effect: str, study: Path) -> None:
+    """Add EFFECT to the models in the study's config.yaml."""
+    from plumbline.models_file import add as lines
+
+    for text in lines(study, effect):
+        click.echo(text)
+
+
+@main.command()
+@click.argument("effect")
+@STUDY
+def drop(effect: str, study: Path) -> None:
+    """Take EFFECT out of the last model in the study's config.yaml."""
+    from plumbline.models_file import drop as lines
+
+    for text in lines(study, effect):
+        click.echo(text)
+
+
+@main.command()
+@click.argument("name", required=False)
+@click.option("--ledger", type=click.Choice(["plant", "control", "robot"]), help="Only this part of the catalogue.")
+@STUDY
+def effects(name: str | None, ledger: str | None, study: Path) -> None:
+    """List the catalogue of effects, or show the effect NAME in full."""
+    from plumbline.config import known_effect
+    from plumbline.effects import catalogue
+    from plumbline.effects_text import full, listing
+
+    known = catalogue(study.resolve())
+    if name is not None:
+        known_effect(name, known)
+    own = frozenset(f.stem for f in (study / "effects").glob("*.py"))
+    for text in full(known[name]) if name else listing(known, ledger, own):
+        click.echo(text)
+    for file, error in known.broken:
+        click.secho(f"{file} cannot be used: {error}", fg="red")
+
+
+@main.command("new-effect")
+@click.argument("name")
+@STUDY
+def new_effect(name: str, study: Path) -> None:
+    """Write effects/NAME.py in the study: an effect of your own, to be changed by hand."""
+    from plumbline.new_effect import write
+
+    for text in write(study, name):
+        click.echo(text)
+
+
+@main.command(hidden=True)
+def docs() -> None:
+    """Write docs/effects.md from the catalogue."""
+    from plumbline.effects import catalogue
+    from plumbline.effects_text import page
+
+    (REPO / "docs" / "effects.md").write_text(page(catalogue()), encoding="utf-8")
+
+
 @main.command()
 @click.argument("folder", type=click.Path(path_type=Path))
 def demo(folder: Path) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 import jsonschema
 
+from plumbline.effects import Catalogue
 from plumbline.errors import PlumblineError
 
 MARKER_SETS = Path(__file__).resolve().parent / "markersets"
@@ -68,10 +69,35 @@ def _explain(error: Any) -> Iterator[str]:
             advice = f"did you mean '{near[0]}'?" if near else f"known here: {', '.join(known)}"
             yield f"unknown key '{place + '.' if place else ''}{key}': {advice}"
     elif error.context:
-        deepest = max(error.context, key=lambda e: len(e.absolute_path))
-        yield f"'{place}': {deepest.message}"
+        deepest = max(error.context, key=lambda e: (len(e.absolute_path), e.validator not in ("const", "type")))
+        yield f"'{'.'.join(str(p) for p in deepest.absolute_path)}': {deepest.message}"
     else:
         yield f"'{place}': {error.message}"
+
+
+def models(config: Mapping[str, Any], known: Catalogue) -> list[tuple[str, tuple[str, ...]]]:
+    """Models that the config lists, in its order: name and effects of each rung above the paper's equation; none for `auto`.
+
+    config: of :func:`with_defaults`.  known: the catalogue of the study.  Raises PlumblineError for an effect that nobody can use.
+    """
+    chosen = config["models"]
+    out = [] if chosen == "auto" else [(str(name), tuple(effects)) for name, effects in chosen.items()]
+    for name, effects in out:
+        for effect in effects:
+            known_effect(effect, known, f"models.{name}: ")
+    return out
+
+
+def known_effect(effect: str, known: Catalogue, place: str = "") -> None:
+    """Raises PlumblineError where the catalogue has no such effect: with the line where its file is broken, else with the nearest name."""
+    if effect in known:
+        return
+    for file, error in known.broken:
+        if Path(file).stem == effect:
+            raise PlumblineError(f"{place}{file} cannot be used: {error}")
+    near = get_close_matches(effect, known, n=1, cutoff=0.5)
+    advice = f"did you mean '{near[0]}'?" if near else "`plumbline effects` lists them"
+    raise PlumblineError(f"{place}no effect is called '{effect}': {advice}")
 
 
 def study_config(folder: Path) -> dict[str, Any]:

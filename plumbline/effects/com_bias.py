@@ -28,7 +28,7 @@ EFFECT = Effect(
     source="x recorded as (1 + a) x + e0; Gonzalez 2014: tables 24.9 mm off in seven people",
     needs=("com_x", "zmp_x"),
     parameters=(Parameter("scale", "1", -0.3, 0.3, matters=0.015), Parameter("e0", "m", -0.1, 0.1)),
-    confounded=("gain", "offset", "force_scale"),
+    confounded=("gain", "offset", "tilt", "force_scale", "hand", "ang_mom", "height"),
     separated="static poses in many places (x = p), with the CoP checked by a known load",
     columns=columns,
     force=force,

@@ -23,7 +23,7 @@ EFFECT = Effect(
     source="transfer function of a causal low-pass, first order in its group delay",
     needs=("com_x", "zmp_x"),
     parameters=(Parameter("delay", "s", 0.0, 0.2, matters=0.003),),
-    confounded=("sync",),
+    confounded=("sync", "soft_tissue"),
     separated="the raw, unfiltered force record: white noise up to its highest frequency rules a filter out",
     columns=columns,
     force=force,

@@ -23,7 +23,7 @@ EFFECT = Effect(
     source="F recorded as (1 + s) F, or a body mass that is wrong",
     needs=("grf_x", "com_x"),
     parameters=(Parameter("s", "1", -0.3, 0.3, matters=0.015),),
-    confounded=("com_bias",),
+    confounded=("com_bias", "gain", "hand"),
     separated="a static trial on a balance; the vertical equation",
     columns=columns,
     force=force,

@@ -23,7 +23,7 @@ EFFECT = Effect(
     source="p recorded as (1 + q) p; sizes: non-linear plate re-calibration, Gait Posture 2011",
     needs=("zmp_x",),
     parameters=(Parameter("q", "1", -0.3, 0.3, matters=0.01),),
-    confounded=("com_bias",),
+    confounded=("com_bias", "force_scale", "hand"),
     separated="a known load at known places of the plate; the shear force beside the markers",
     columns=columns,
     undo=undo,

@@ -33,7 +33,7 @@ EFFECT = Effect(
         Parameter("height", "m", 0.0, 2.5),
         Parameter("x", "m", -5.0, 5.0),
     ),
-    confounded=("com_bias", "push"),
+    confounded=("com_bias", "force_scale", "gain", "push"),
     separated="a load cell under the hand, or trials without it",
     columns=columns,
     force=force,
