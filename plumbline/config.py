@@ -4,12 +4,14 @@ import json
 from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jsonschema
 
-from plumbline.effects import Catalogue
 from plumbline.errors import PlumblineError
+
+if TYPE_CHECKING:  # the Snakefile reads the config at each start and needs no numpy for it
+    from plumbline.effects import Catalogue
 
 MARKER_SETS = Path(__file__).resolve().parent / "markersets"
 SCHEMAS = Path(__file__).resolve().parents[1] / "workflow" / "schemas"
@@ -75,7 +77,7 @@ def _explain(error: Any) -> Iterator[str]:
         yield f"'{place}': {error.message}"
 
 
-def models(config: Mapping[str, Any], known: Catalogue) -> list[tuple[str, tuple[str, ...]]]:
+def models(config: Mapping[str, Any], known: "Catalogue") -> list[tuple[str, tuple[str, ...]]]:
     """Models that the config lists, in its order: name and effects of each rung above the paper's equation; none for `auto`.
 
     config: of :func:`with_defaults`.  known: the catalogue of the study.  Raises PlumblineError for an effect that nobody can use.
@@ -88,7 +90,7 @@ def models(config: Mapping[str, Any], known: Catalogue) -> list[tuple[str, tuple
     return out
 
 
-def known_effect(effect: str, known: Catalogue, place: str = "") -> None:
+def known_effect(effect: str, known: "Catalogue", place: str = "") -> None:
     """Raises PlumblineError where the catalogue has no such effect: with the line where its file is broken, else with the nearest name."""
     if effect in known:
         return

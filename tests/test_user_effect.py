@@ -1,0 +1,64 @@
+"""An effect of the user's own, from a study that nothing explains to the file that does."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from made_study import EVALUATION, Result
+
+from plumbline import cli
+from plumbline.config import models, study_config
+from plumbline.effects import Catalogue, catalogue
+from plumbline.evidence import of_part
+from plumbline.physics import G
+from plumbline.ranking import Finding, judge
+from plumbline.simulate.person import draw_subject
+from plumbline.simulate.study import write_study
+
+README = (Path(__file__).resolve().parents[1] / "README.md").read_text(encoding="utf-8")
+FRICTION = {"friction": {"size": 8.0, "speed": 0.05, "height": 1.1}}  # stands in no catalogue
+LAB = {"trials": 8, "duration": 8.0, "rate": 100.0, "force_rate": 500.0}
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Result]:
+    """A person who rubs against a rail in eight trials, recorded and read again."""
+    study = tmp_path_factory.mktemp("rail")
+    write_study(study, [draw_subject("sub-01", 3)], seed=11, effects=FRICTION, **LAB)
+    return study, Result(study)
+
+
+def judged(result: Result, known: Catalogue) -> Finding:
+    """What the plant lacks, lateral axis, all subjects."""
+    windows = [w for w in of_part(result.signals, result.pushes, result.coverage, known, EVALUATION) if w.axis == "lateral"]
+    plant = {k: e for k, e in known.items() if e.ledger == "plant"}
+    return judge([windows], plant, [G / float(np.mean([w.height for w in windows]))])
+
+
+def test_without_the_file_something_is_left_and_nobody_is_named(made: tuple[Path, Result]) -> None:
+    """Of the library's effects none is blamed for a rail that rubs, and the error stays."""
+    got = judged(made[1], catalogue())
+    assert list(got.found) == []
+    assert got.shapes or got.left
+    assert got.final > 4 * got.floor
+
+
+def test_with_the_readmes_file_it_is_found_first_and_the_error_falls(made: tuple[Path, Result]) -> None:
+    """The README's file in the study: named, with the largest fall and the size that was hidden; the error falls to a third or less."""
+    study, result = made
+    (study / "effects").mkdir(exist_ok=True)
+    (text,) = [block for block in re.findall(r"```python\n(.*?)```", README, re.DOTALL) if "EFFECT" in block]
+    (study / "effects" / "rail.py").write_text(text, encoding="utf-8")
+    known = catalogue(study)
+    assert known.broken == []
+    got = judged(result, known)
+    first = max(got.found, key=lambda one: one.before - one.after)
+    assert first.effect == "rail"
+    assert first.values[0] == pytest.approx(8.0, rel=0.15)
+    assert first.after < first.before / 3
+    assert got.final < got.base / 3
+    done = CliRunner().invoke(cli.main, ["add", "rail", "--study", str(study)])
+    assert done.exit_code == 0, done.output
+    assert models(study_config(study), known) == [("with_rail", ("rail",))]
