@@ -92,11 +92,11 @@ def models(config: Mapping[str, Any], known: "Catalogue") -> list[tuple[str, tup
 
 def known_effect(effect: str, known: "Catalogue", place: str = "") -> None:
     """Raises PlumblineError where the catalogue has no such effect: with the line where its file is broken, else with the nearest name."""
+    for file, error in known.broken:
+        if Path(file).stem == effect:  # also where the library has one of that name: the study's own was meant
+            raise PlumblineError(f"{place}{file} cannot be used: {error}")
     if effect in known:
         return
-    for file, error in known.broken:
-        if Path(file).stem == effect:
-            raise PlumblineError(f"{place}{file} cannot be used: {error}")
     near = get_close_matches(effect, known, n=1, cutoff=0.5)
     advice = f"did you mean '{near[0]}'?" if near else "`plumbline effects` lists them"
     raise PlumblineError(f"{place}no effect is called '{effect}': {advice}")

@@ -105,15 +105,16 @@ def test_twice_says_so_and_changes_nothing(tmp_path: Path) -> None:
         ("", "synk", "no effect is called 'synk': did you mean 'sync'"),
         ("", "zzzzzz", "`plumbline effects` lists them"),
         ("", "bad", r"effects/bad\.py cannot be used: line 2: NameError"),
+        ("", "gain", r"effects/gain\.py cannot be used: line 1"),
         ("models: {a: [angmom]}\n", "sync", "models.a: no effect is called 'angmom': did you mean 'ang_mom'"),
         ("models: {a: [bad]}\n", "sync", "models.a: effects/bad.py cannot be used: line 2"),
         ("models: {}\n", "sync", "models"),
         ("models: autoo\n", "sync", "'models': 'auto' was expected"),
         ("models: {base: [sync]}\n", "sync", "'models': 'base' should not"),
         ("models: {a: sync}\n", "sync", "'models.a': 'sync' is not of type 'array'"),
-        ("models: {a: [sync, sync]}\n", "gain", "models.a"),
+        ("models: {a: [sync, sync]}\n", "tilt", "models.a"),
         ("model: auto\n", "sync", "did you mean 'models'"),
-        ("models: {a: &x [gain]}\nevaluation: {train: *x}\n", "sync", ""),
+        ("models: {a: &x [tilt]}\nevaluation: {train: *x}\n", "sync", ""),
         ("markerset: &m auto\nmodels: *m\n", "sync", "Write this there yourself:\nmodels:\n  with_sync: .sync."),
     ],
 )
@@ -121,11 +122,12 @@ def test_mistakes_are_named_and_nothing_is_written(tmp_path: Path, config: str, 
     """Unknown effects, broken effect files and broken configs are one message with the place; the file is as it was."""
     (tmp_path / "effects").mkdir()
     (tmp_path / "effects" / "bad.py").write_text("a = 1\nnonsense\n", encoding="utf-8")
+    (tmp_path / "effects" / "gain.py").write_text("nonsense\n", encoding="utf-8")
     file = tmp_path / "config.yaml"
     file.write_text(config, encoding="utf-8")
     if not said:
         list(add(tmp_path, effect))
-        assert yaml.safe_load(file.read_text(encoding="utf-8"))["models"] == {"a": ["gain"], "with_sync": ["gain", "sync"]}
+        assert yaml.safe_load(file.read_text(encoding="utf-8"))["models"] == {"a": ["tilt"], "with_sync": ["tilt", "sync"]}
         return
     with pytest.raises(PlumblineError, match=said):
         list(add(tmp_path, effect))

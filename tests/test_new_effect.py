@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+import plumbline.effects
 from plumbline import cli
 from plumbline.effects import Channels, catalogue
 from plumbline.errors import PlumblineError
@@ -50,6 +51,14 @@ def test_written_file_is_a_full_member(tmp_path: Path) -> None:
     assert effect.columns(c).shape == effect.force(c).shape == (n, len(effect.parameters))
     assert np.isfinite(effect.columns(c)).all()
     assert (effect.force(c) < 0).all()  # against a velocity that is positive
+
+
+def test_moved_into_the_library_it_is_a_member_of_every_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The unchanged file, put where the library keeps its effects, is found there."""
+    list(write(tmp_path, "moved_rail"))
+    monkeypatch.setattr(plumbline.effects, "HERE", tmp_path / "effects")
+    monkeypatch.setattr(plumbline.effects, "__path__", [*plumbline.effects.__path__, str(tmp_path / "effects")])
+    assert catalogue()["moved_rail"].title == "Something rubs"
 
 
 @pytest.mark.parametrize(
