@@ -12,16 +12,17 @@ windows are all that the search needs.
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from plumbline.effects import Catalogue, Channels, Effect
+from plumbline.effects import Catalogue, Channels, Effect, where
 from plumbline.effects._channels import of_trial
-from plumbline.plant import Plant, of_trials
+from plumbline.plant import AXES, Plant, of_trials
 from plumbline.shapes import SHAPES
 from plumbline.weak import Bump, white_noise_sd
 
@@ -36,6 +37,8 @@ class Weak:
 
     com, velocity, zmp: bump means.  acceleration: weak x'' [m/s2].  force: Fx/m [m/s2], NaN without shear.  vertical: z'' + g - Fz/m.
     lever: x - p [m].  cluster: number of the independent piece.  terms: effect -> part -> (n, k).  lacking: effect -> what it needs.
+    centre: effect -> coefficients that were taken out of the channels first.  feet: CoP of both plates from the middles of their feet,
+    mean over the trial [m]; NaN where the feet are not known from markers, and for the forward axis.
     noise: sd of the white noise of x, p [m], z [m], Fx, Fz [N]; NaN where not known.  unit: sums of squares of the bump and its curvature.
     """
 
@@ -59,7 +62,8 @@ class Weak:
     bump: Bump
     terms: dict[str, dict[str, Array]]
     lacking: dict[str, str]
-    names: frozenset[str] = frozenset()
+    centre: Mapping[str, Array] = field(default_factory=dict)
+    feet: float = float("nan")
 
     @property
     def lever(self) -> Array:
@@ -80,32 +84,45 @@ class Weak:
 
 def of_part(
     signals: pd.DataFrame, pushes: pd.DataFrame, coverage: pd.DataFrame, effects: Catalogue, evaluation: Mapping[str, Any],
-    undo: Mapping[str, Mapping[str, Array]] | None = None,
+    *, undo: Mapping[str, Array] | None = None, axis: str = "",
 ) -> Iterator[Weak]:  # fmt: skip
     """Windows of every trial and axis that has a CoM and a ZMP.
 
-    undo: "subject/axis" -> effect -> parameters that are taken out of the channels first (effects with `undo`).
+    coverage: its rows choose the trials.  undo: effect -> coefficients that are taken out of the channels first (effects with `undo`).
+    axis: lateral or forward; both where empty.
     """
     chosen = {k: e for k, e in effects.items() if e.ledger == "plant" and e.columns is not None and not e.twin}
-    settings = {k: evaluation[k] for k in ("half_width", "exponent")}
+    settings: dict[str, Any] = {k: evaluation[k] for k in ("half_width", "exponent")}
+    settings["axes"] = (axis,) if axis else tuple(AXES)
+    heights = coverage.groupby("subject", observed=True)["height_com"].mean()
     for about, frames, plants in of_trials(signals, pushes, coverage, **settings):
-        for axis, plant in plants.items():
-            channels = of_trial(frames, axis, float(about["mass"]))
-            out = (undo or {}).get(f"{about['subject']}/{axis}", {})
-            for name, values in out.items():
-                channels = effects[name].undo(channels, values)  # type: ignore[misc]
-            yield of_one(about, channels, axis, plant, chosen | SHAPES)
+        for here, plant in plants.items():
+            channels = of_trial(frames, here, float(about["mass"]), heights[about["subject"]])
+            noise = _noise(channels, plant)  # of what was recorded: between frames some of it is averaged away
+            for name, theta in (undo or {}).items():
+                channels = effects[name].undo(channels, theta)  # type: ignore[misc]
+            feet = _feet(channels) if here == "lateral" and about["support"] == "markers" else float("nan")
+            yield replace(of_one(about, channels, here, plant, chosen | SHAPES), noise=noise, centre=dict(undo or {}), feet=feet)
+
+
+def _feet(c: Channels) -> float:
+    """How far the CoP of each plate lies to the right of the middle of its foot, both feet together [m]."""
+    if not (c.has("cop_left_x") and c.has("cop_right_x")):
+        return float("nan")
+    return float(np.nanmean(c.cop_left_x - c.limit_left) + np.nanmean(c.cop_right_x - c.limit_right)) / 2
 
 
 def of_one(about: Any, channels: Channels, axis: str, plant: Plant, effects: Mapping[str, Effect]) -> Weak:
     """Windows of one trial and axis from its channels."""
-    picked, bump = plant.picked, plant.bump
+    bump = plant.bump
+    picked = plant.picked
+    # channels put back in time have no ends; without them there is no window
+    seen = [channels[k] for k in ("zmp_x", "grf_x") if channels.has(k)]
+    picked = picked[np.all([np.isfinite(_mean(c, bump.value, picked)) for c in seen], axis=0)]
+    picked = picked[picked + bump.reach < _fallen(channels, axis)]
 
     def mean(values: Array, weights: Array = bump.value) -> Array:
-        """Bump-weighted mean of (n,) or (n, k) at the picked frames."""
-        columns = values.reshape(len(values), -1)
-        seen = np.lib.stride_tricks.sliding_window_view(columns, len(weights), axis=0)[picked - bump.reach]
-        return np.asarray(seen @ weights).reshape(len(picked), *values.shape[1:])
+        return _mean(values, weights, picked)
 
     terms: dict[str, dict[str, Array]] = {}
     lacking: dict[str, str] = {}
@@ -114,26 +131,53 @@ def of_one(about: Any, channels: Channels, axis: str, plant: Plant, effects: Map
         if missing:
             lacking[name] = ", ".join(missing)
             continue
-        parts = _parts(effect, channels)
+        try:
+            parts = _parts(effect, channels)
+        except Exception as error:  # a user's file may fail in any way; the others go on
+            lacking[name] = f"its file to be put right: {where(error, Path(effect.file))}"
+            continue
         weak = {part: mean(values) for part, values in parts.items()}
         if all(np.isfinite(v).all() for v in weak.values()):
             terms[name] = weak
         else:
             lacking[name] = f"{', '.join(effect.needs)} without gaps"
     x, z = channels.com_x, channels.com_z
-    noise = {"x": plant.noise_x, "p": plant.noise_p, "z": _noise(z, plant)}
-    noise |= {"fx": _noise(channels.grf_x, plant), "fz": _noise(channels.grf_z, plant)}
     vertical = mean(z, bump.curvature) + channels.g - mean(channels.grf_z) / channels.mass
     key = (about["trial"], about["subject"], about["task"], about["condition"], axis)
     motion = (mean(x), mean(x, bump.slope), mean(channels.zmp_x), mean(x, bump.curvature))
     return Weak(
         *key, picked, channels.time[picked], plant.cluster[picked], *motion,
-        mean(channels.grf_x) / channels.mass, vertical, channels.mass, plant.height, noise, bump, terms, lacking,
+        mean(channels.grf_x) / channels.mass, vertical, channels.mass, plant.height, _noise(channels, plant), bump, terms, lacking,
     )  # fmt: skip
 
 
-def _noise(values: Array, plant: Plant) -> float:
-    return float(white_noise_sd(values)) if np.isfinite(plant.noise_x) and np.isfinite(values).any() else float("nan")
+def _fallen(c: Channels, axis: str) -> int:
+    """Frame from which on the CoM is beside the feet for good; the number of frames where it is not.
+
+    One fall reaches ten times as far as all that the person recovered from: left out, it would be told from the others by a line.
+    """
+    n = len(c.com_x)
+    if axis != "lateral" or not c.has("limit_left"):
+        return n + 1
+    # a person never comes back from there; walkers do, at their next step
+    beside = (c.com_x < np.nanmin(c.limit_left)) | (c.com_x > np.nanmax(c.limit_right))
+    back = np.flatnonzero(~beside & np.isfinite(c.com_x))
+    return int(back[-1]) + 1 if len(back) and beside[back[-1] :].any() else n + 1
+
+
+def _mean(values: Array, weights: Array, picked: NDArray[np.int64]) -> Array:
+    """Weighted mean of (n,) or (n, k) at the picked frames."""
+    columns = values.reshape(len(values), -1)
+    seen = np.lib.stride_tricks.sliding_window_view(columns, len(weights), axis=0)[picked - len(weights) // 2]
+    return np.asarray(seen @ weights).reshape(len(picked), *values.shape[1:])
+
+
+def _noise(c: Channels, plant: Plant) -> dict[str, float]:
+    """Sd of the white noise of x, p, z, Fx, Fz."""
+    others = {"z": c.com_z, "fx": c.grf_x, "fz": c.grf_z}
+    known = np.isfinite(plant.noise_x)
+    sd = {k: float(white_noise_sd(v)) if known and np.isfinite(v).any() else float("nan") for k, v in others.items()}
+    return {"x": plant.noise_x, "p": plant.noise_p, **sd}
 
 
 def _parts(effect: Effect, c: Channels) -> dict[str, Array]:
@@ -148,4 +192,4 @@ def _parts(effect: Effect, c: Channels) -> dict[str, Array]:
 
 
 def _with(c: Channels, w2: float) -> Channels:
-    return Channels(c.values, c.rate, c.mass, w2, c.g)
+    return replace(c, w2=w2)

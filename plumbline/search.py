@@ -55,11 +55,13 @@ class Sums:
         return np.asarray(self.square[:, pieces] - 2 * r @ theta + np.einsum("ecij,i,j->ec", g, theta, theta))
 
 
-def sums(windows: Sequence[Weak], effects: Sequence[str], w2: float) -> Sums:
+def sums(windows: Sequence[Weak], effects: Sequence[str], w2: float, h: float = 0.0) -> Sums:
     """Sums of one subject and axis.  effects: those offered; a trial that lacks a term of one has it dropped by the caller.
 
-    w2: of the base model [1/s2].
+    w2: (z'' + g)/z [1/s2].  h: lever per acceleration of the body [s2], 1/w2 where not given: legs that lean under an upright trunk make it
+    a tenth larger, and a force that is missing in Fx goes with it.
     """
+    h = h or 1.0 / w2
     shear = all(np.isfinite(w.force).all() for w in windows)
     equations = ("kinematic", "moment", "vertical", "whole") if shear else ("whole",)
     columns = [(name, 0) for name in BASE]
@@ -72,9 +74,9 @@ def sums(windows: Sequence[Weak], effects: Sequence[str], w2: float) -> Sums:
     at = 0
     for w in windows:
         for e, equation in enumerate(equations):
-            x, y = design(w, equation, effects, w2)
+            x, y = design(w, equation, effects, w2, h)
             z = np.column_stack([x, y])
-            noise = w.floor(equation, 1.0 / w2)
+            noise = w.floor(equation, h)
             for k, c in enumerate(np.unique(w.cluster)):
                 part = z[w.cluster == c]
                 products = part.T @ part
@@ -87,23 +89,37 @@ def sums(windows: Sequence[Weak], effects: Sequence[str], w2: float) -> Sums:
     return Sums(equations, tuple(columns), out["gram"], out["right"], square, count, trial, names, floor, w2, mass)
 
 
-def design(w: Weak, equation: str, effects: Sequence[str], w2: float) -> tuple[Array, Array]:
-    """Columns (n, P) and left side (n,) of an equation; kinematic and vertical in m/s2, moment and whole in m."""
+def design(w: Weak, equation: str, effects: Sequence[str], w2: float, h: float) -> tuple[Array, Array]:
+    """Columns (n, P) and left side (n,) of an equation; kinematic and vertical in m/s2, moment and whole in m.
+
+    What was taken out of the channels before the windows were made is given back to first order: coefficients are of the whole effect.
+    """
     n = len(w.time)
     base = np.zeros((n, 4))
     if equation == "kinematic":
         base[:, 0] = 1.0
-        parts = [w.terms[name]["force"] for name in effects]
-        return np.column_stack([base, *parts]), w.acceleration - w.force
-    if equation == "vertical":
+        left = w.acceleration - w.force
+    elif equation == "vertical":
         base[:, 2] = 1.0
-        return np.column_stack([base, *(w.terms[name]["vertical"] for name in effects)]), w.vertical
-    base[:, 1] = 1.0
-    base[:, 3] = w.force if equation == "moment" else w.acceleration
-    parts = [-w.terms[name]["plain"] / w2 - w.terms[name]["by_w2"] for name in effects]
-    if equation == "moment":
-        parts = [part + w.terms[name]["force"] / w2 for part, name in zip(parts, effects, strict=True)]
-    return np.column_stack([base, *parts]), w.lever
+        left = w.vertical
+    else:
+        # a force that the plates miss stands in x'' but not in the moment
+        base[:, 0] = -h if equation == "whole" and np.isfinite(w.force).all() else 0.0
+        base[:, 1] = 1.0
+        base[:, 3] = w.force if equation == "moment" else w.acceleration
+        left = w.lever
+    for name, theta in w.centre.items():
+        left = left + _part(w, equation, name, w2, h) @ theta
+    return np.column_stack([base, *(_part(w, equation, name, w2, h) for name in effects)]), left
+
+
+def _part(w: Weak, equation: str, name: str, w2: float, h: float) -> Array:
+    """Columns of one effect in an equation, (n, k)."""
+    terms = w.terms[name]
+    if equation in ("kinematic", "vertical"):
+        return terms["force" if equation == "kinematic" else "vertical"]
+    out = -terms["plain"] / w2 - terms["by_w2"]
+    return out + h * terms["force"] if equation == "moment" else out
 
 
 # -- fits -------------------------------------------------------------------------------------------------------------
@@ -118,10 +134,11 @@ def solve(gram: Array, right: Array) -> Array:
     return np.asarray(np.linalg.solve(g, (right / scale)[..., None])[..., 0] / scale)
 
 
-def heldout(s: Sums, weight: Array, sets: Sequence[Index]) -> Array:
+def heldout(s: Sums, weight: Array, sets: Sequence[Index], silent: Index | None = None) -> Array:
     """Sum of squares of each set, equation and piece on folds left out, (S, E, C).
 
-    weight: of each equation (E,), 0 for those that are only looked at.  sets: columns of each model.
+    weight: of each equation (E,), 0 for those that are only looked at.  sets: columns of each model.  silent: columns that are fitted
+    but whose part stays in the residual.
     """
     fold = s.folds
     gram = np.einsum("e,ecij->cij", weight, s.gram)
@@ -139,6 +156,8 @@ def heldout(s: Sums, weight: Array, sets: Sequence[Index]) -> Array:
             theta = solve(g[chosen[:, :, None], chosen[:, None, :]], r[chosen])
             full = np.zeros((len(members), len(s.columns)))
             np.put_along_axis(full, chosen, theta, 1)
+            if silent is not None:
+                full[:, silent] = 0.0
             cross = np.einsum("eci,ki->kec", test_r, full)
             power = np.einsum("ki,ecij,kj->kec", full, test_g, full, optimize=True)
             out[np.ix_(np.array(members), np.arange(len(s.equations)), np.flatnonzero(mine))] = s.square[None, :, mine] - 2 * cross + power

@@ -35,7 +35,7 @@ def channels(seed: int = 1) -> Channels:
     values = {"time": t, "com_x": wave(0.03), "zmp_x": wave(0.05), "com_z": 0.95 + wave(0.01), "ang_mom": wave(1.0)}
     values |= {"grf_x": wave(20.0), "grf_z": 700.0 + wave(10.0)}
     values |= {name: wave(0.1) for name in ("com_y", "zmp_y", "grf_y", "com_lp_x", "com_dot_x", "com_ddot_x", "zmp_lp_x")}
-    return Channels(values, 100.0, 70.0)
+    return Channels(values, 100.0, 70.0, 1.0)
 
 
 @pytest.mark.parametrize("name", PLANT)
@@ -44,7 +44,7 @@ def test_columns_have_the_shape_of_the_trial_and_are_affine_in_w2(name: str) -> 
     effect = PLANT[name]
     assert effect.columns is not None
     c = channels()
-    a, b, d = (effect.columns(Channels(c.values, c.rate, c.mass, w2)) for w2 in (0.0, 1.0, 3.0))
+    a, b, d = (effect.columns(Channels(c.values, c.rate, c.mass, c.height, w2)) for w2 in (0.0, 1.0, 3.0))
     assert a.ndim == 2
     assert len(a) == 400
     np.testing.assert_allclose(d, a + 3.0 * (b - a), rtol=1e-9, atol=1e-12)
@@ -69,7 +69,7 @@ def test_undo_takes_out_what_the_columns_describe(name: str) -> None:
     """To first order, what a small amount of an effect adds to x'' - w2 (x - p) and to x'' - F/m is its columns times the amount."""
     effect = PLANT[name]
     c = channels()
-    c = Channels(c.values, c.rate, c.mass, 9.0)
+    c = Channels(c.values, c.rate, c.mass, c.height, 9.0)
     amount = np.array([1e-4, 0.0])[: len(effect.parameters)]
     clean = effect.undo(c, amount)  # type: ignore[misc]
     assert effect.columns is not None

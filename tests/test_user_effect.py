@@ -3,17 +3,15 @@
 import re
 from pathlib import Path
 
-import numpy as np
 import pytest
 from click.testing import CliRunner
 from made_study import EVALUATION, Result
 
 from plumbline import cli
 from plumbline.config import models, study_config
+from plumbline.criticism import settled
 from plumbline.effects import Catalogue, catalogue
-from plumbline.evidence import of_part
-from plumbline.physics import G
-from plumbline.ranking import Finding, judge
+from plumbline.ranking import Finding
 from plumbline.simulate.person import draw_subject
 from plumbline.simulate.study import write_study
 
@@ -32,9 +30,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Result]:
 
 def judged(result: Result, known: Catalogue) -> Finding:
     """What the plant lacks, lateral axis, all subjects."""
-    windows = [w for w in of_part(result.signals, result.pushes, result.coverage, known, EVALUATION) if w.axis == "lateral"]
-    plant = {k: e for k, e in known.items() if e.ledger == "plant"}
-    return judge([windows], plant, [G / float(np.mean([w.height for w in windows]))])
+    return next(iter(settled(result.signals, result.pushes, result.coverage, known, EVALUATION)))[1]
 
 
 def test_without_the_file_something_is_left_and_nobody_is_named(made: tuple[Path, Result]) -> None:
@@ -56,7 +52,7 @@ def test_with_the_readmes_file_it_is_found_first_and_the_error_falls(made: tuple
     got = judged(result, known)
     first = max(got.found, key=lambda one: one.before - one.after)
     assert first.effect == "rail"
-    assert first.values[0] == pytest.approx(8.0, rel=0.15)
+    assert next(iter(first.parameters.values()))[0] == pytest.approx(8.0, rel=0.15)
     assert first.after < first.before / 3
     assert got.final < got.base / 3
     done = CliRunner().invoke(cli.main, ["add", "rail", "--study", str(study)])

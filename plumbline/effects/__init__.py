@@ -15,7 +15,7 @@ from typing import NamedTuple
 from plumbline.effects._channels import Channels
 from plumbline.effects._effect import Effect, Parameter
 
-__all__ = ["Catalogue", "Channels", "Effect", "Parameter", "catalogue"]
+__all__ = ["Catalogue", "Channels", "Effect", "Parameter", "catalogue", "where"]
 
 HERE = Path(__file__).resolve().parent
 DATA_FILES = ("*.py",)  # found by themselves, so the digest of the code must count them all
@@ -36,13 +36,14 @@ def catalogue(study: Path | None = None) -> Catalogue:
     """The effects of the library, and those of the study in folder `study` (its `effects/*.py`, which win where ids are the same)."""
     out = Catalogue()
     out.broken = []
+    study = study.resolve() if study else None  # a trace of an error names files whole
     for file in [*_files(HERE), *(_files(study / "effects") if study else ())]:
         effect, error = _load(file)
         if effect is None:
             out.broken.append((str(file.relative_to(study) if study and file.is_relative_to(study) else file.name), error))
         else:
             out.pop(file.stem, None)
-            out[file.stem] = replace(effect, id=file.stem, file=file.name)
+            out[file.stem] = replace(effect, id=file.stem, file=str(file))
     return out
 
 

@@ -24,19 +24,15 @@ class Channels:
     Along the axis that is judged: com_x, zmp_x, grf_x, ang_mom (about the CoM, positive turning +z towards +x); com_z (above the
     plates), grf_z, time (from the trial's start), and every other column of `signals` by its own name, x for the axis and y for the
     other. `_dot` and `_ddot` behind any name are time derivatives (central differences: the weak form averages them). w2: of the base
-    model [1/s2]; mass [kg]; rate [Hz]; height: mean of com_z [m]; g.
+    model [1/s2]; mass [kg]; rate [Hz]; height: of the CoM, one for all trials of a person [m]; g.
     """
 
     values: Mapping[str, Array]
     rate: float
     mass: float
+    height: float
     w2: float = 0.0
     g: float = G
-
-    @property
-    def height(self) -> float:
-        """Mean height of the CoM over the plates [m]."""
-        return float(np.nanmean(self["com_z"])) if self.has("com_z") else float("nan")
 
     def __getitem__(self, name: str) -> Array:
         """A channel [SI], shape (n,).  Raises KeyError for a name that no table has."""
@@ -68,14 +64,17 @@ class Channels:
         return replace(self, values={**self.values, **channels})
 
     def shifted(self, names: tuple[str, ...], delay: float) -> Channels:
-        """The same with the named channels that were recorded `delay` [s] late put back (linear between frames; ends repeat)."""
+        """The same with the named channels that were recorded `delay` [s] late put back (linear between frames), NaN at the ends."""
         n = len(self.values["time"])
         at = np.arange(n) + delay * self.rate
-        return self.changed(**{k: np.interp(at, np.arange(n), self.values[k]) for k in names if self.has(k)})
+        return self.changed(**{k: np.interp(at, np.arange(n), self.values[k], np.nan, np.nan) for k in names if self.has(k)})
 
 
-def of_trial(frames: pd.DataFrame, axis: str, mass: float) -> Channels:
-    """Channels of one trial.  frames: its rows of `signals`.  axis: lateral or forward.  mass [kg]."""
+def of_trial(frames: pd.DataFrame, axis: str, mass: float, height: float = float("nan")) -> Channels:
+    """Channels of one trial.  frames: its rows of `signals`.  axis: lateral or forward.  mass [kg].
+
+    height: of the CoM over the plates, mean of the person's trials [m]; of this one where not given.
+    """
     here, other = AXIS[axis]
     swap = {f"_{here}": "_x", f"_{other}": "_y"}
     out: dict[str, Array] = {}
@@ -87,7 +86,8 @@ def of_trial(frames: pd.DataFrame, axis: str, mass: float) -> Channels:
     out["com_z"] = out["com_z"] - np.nan_to_num(out["zmp_z"])
     out["time"] = out["time"] - out["time"][:1]
     rate = (len(frames) - 1) / float(np.ptp(out["time"])) if len(frames) > 1 else float("nan")
-    return Channels(out, rate, mass)
+    own = float(np.nanmean(out["com_z"])) if np.isfinite(out["com_z"]).any() else float("nan")
+    return Channels(out, rate, mass, height if np.isfinite(height) else own)
 
 
 def derivative(values: Array, rate: float, order: int) -> Array:

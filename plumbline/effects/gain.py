@@ -7,8 +7,13 @@ from plumbline.effects._effect import Effect, Parameter
 
 
 def columns(c: Channels) -> Array:
-    """w2 p [per 1]: first order in q; `undo` is exact."""
+    """w2 p [per q/(1 + q)], p as recorded."""
     return np.asarray((c.w2 * c.zmp_x)[:, None])
+
+
+def values(theta: Array, constant: float) -> Array:
+    """q from its share of the recorded p."""
+    return np.asarray(theta / (1.0 - theta))
 
 
 def undo(c: Channels, values: Array) -> Channels:
@@ -26,5 +31,6 @@ EFFECT = Effect(
     confounded=("com_bias", "force_scale", "hand"),
     separated="a known load at known places of the plate; the shear force beside the markers",
     columns=columns,
+    values=values,
     undo=undo,
 )

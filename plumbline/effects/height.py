@@ -7,10 +7,10 @@ from plumbline.effects._effect import Effect, Parameter
 
 
 def columns(c: Channels) -> Array:
-    """w2 (w(t)/w0 - 1) (x - p) with w(t) = (z'' + g)/z, w0 its mean; the plates measure z'' + g better than the markers."""
+    """w2 (w(t)/w0 - 1) (x - p) with w(t) = (z'' + g)/z, w0 the person's; the plates measure z'' + g better than the markers."""
     push = c.grf_z / c.mass if c.has("grf_z") else c.com_z_ddot + c.g
     w = push / c.com_z
-    return np.asarray((c.w2 * (w / np.nanmean(w) - 1.0) * (c.com_x - c.zmp_x))[:, None])
+    return np.asarray((c.w2 * (w * c.height / c.g - 1.0) * (c.com_x - c.zmp_x))[:, None])
 
 
 EFFECT = Effect(

@@ -1,0 +1,96 @@
+"""Constants: a CoP, a CoM or a level that is off by a fixed amount. Told last, from constants that every model has."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import stdtr
+
+from plumbline.contest import Case, Set, decisive
+from plumbline.physics import G
+
+LEAST = 0.0003  # [m] a constant below it is nobody's business
+FLOORS = 1.5  # [1] noise floors, the same
+UNKNOWN = 0.001  # [m] the same where the floor is not known
+SURE = 4.0  # [1] standard errors
+LEANING = 0.2  # [1] of a tilt's constant that may stand on the moment side too: the body leans with it
+FOOT = 0.002  # [m] by which a person stands on the one side of both feet
+TELLS = 9.0  # [1] difference of squared distances in standard errors that tells a CoP from a CoM
+
+
+@dataclass(frozen=True)
+class Constant:
+    """An effect told by its constant.
+
+    effect: id, empty where only the family is known.  parameters: name -> value, lower, upper.  columns: base columns it stands for.
+    size: what it adds to the error [m].  p: of none.
+    """
+
+    effect: str
+    family: Set
+    parameters: dict[str, tuple[float, float, float]]
+    columns: Set
+    size: float
+    p: float
+
+
+@dataclass(frozen=True)
+class _Level:
+    """A constant over the subjects: mean, standard error, rms [m or m/s2], p of none."""
+
+    mean: float
+    error: float
+    rms: float
+    p: float
+
+
+def constants(case: Case, members: Set, feet: Sequence[Sequence[float]]) -> list[Constant]:
+    """Effects that are constants.  members: of the model.  feet: CoP from the middles of the feet, of each subject and trial [m].
+
+    Nothing where a contact with a place of its own stands in the model: it takes the constants.
+    """
+    if case.placed(members):
+        return []
+    noise = float(case.floor[-1])
+    least = max(LEAST, FLOORS * noise) if np.isfinite(noise) else UNKNOWN
+    out = []
+    level = _level(case, members, "=kinematic") if decisive(case.sums[0])[0] and len(case.equations) > 1 else None
+    w2 = float(np.mean([s.w2 for s in case.sums]))
+    if level and level.rms / w2 > least and abs(level.mean) > SURE * level.error:
+        value = (level.mean / G, (level.mean - 2 * level.error) / G, (level.mean + 2 * level.error) / G)
+        out.append(Constant("tilt", ("tilt",), {"angle": value}, ("=kinematic",), level.rms / w2, level.p))
+        least += LEANING * level.rms / w2
+    level = _level(case, members, "=moment")
+    if level.rms > least and level.rms > SURE * level.error:
+        out.append(_moment(level, feet, alone=len(case.equations) == 1))
+    return out
+
+
+def _level(case: Case, members: Set, column: str) -> _Level:
+    fits = [(s, case.fit(s, members)) for s in case.sums]
+    each = np.array([float(f.of(s, column)[0][0]) for s, f in fits])
+    own = np.array([float(np.sqrt(f.of(s, column)[1][0, 0])) for s, f in fits])
+    error = float(np.sqrt(np.mean(own**2) / len(own)))
+    few = max(sum(f.clusters for _, f in fits) - len(fits), 1)
+    rms = float(np.sqrt(np.mean(each**2)))
+    return _Level(float(each.mean()), error, rms, 2 * float(stdtr(few, -rms / max(error, 1e-300))))
+
+
+def _moment(level: _Level, feet: Sequence[Sequence[float]], *, alone: bool) -> Constant:
+    """Constant of x - p: a CoP that is shifted moves under both feet, a CoM does not."""
+    offset = -level.mean
+    known = np.array([np.nanmean(f) for f in feet if np.isfinite(f).any()])
+    family: Set = ("offset", "com_bias", *(("tilt",) if alone else ()))
+    if len(known):
+        spread = [np.nanvar(f, ddof=1) / np.isfinite(f).sum() for f in feet if np.isfinite(f).sum() > 1]
+        error = np.sqrt((FOOT**2 + (np.mean(spread) if spread else FOOT**2)) / len(known))
+        tells = (known.mean() / error) ** 2 - ((known.mean() - offset) / error) ** 2
+        if abs(tells) > TELLS:
+            family = ("offset",) if tells > 0 else family[1:]
+    effect = family[0] if len(family) == 1 or (len(known) and len(family) == 2) else ""
+    half = 2 * level.error
+    about = {
+        "offset": {"b": (offset, offset - half, offset + half)},
+        "com_bias": {"e0": (-offset, -offset - half, -offset + half)},
+    }
+    return Constant(effect, family, about.get(effect, {}), ("=moment",), level.rms, level.p)
