@@ -1,56 +1,124 @@
 """The plant of a study judged: windows with the instruments settled, subject by subject, then all subjects together."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from plumbline import evidence
+from plumbline import evidence, findings
 from plumbline.effects import Catalogue, Effect
 from plumbline.evidence import Weak
 from plumbline.physics import G
+from plumbline.plant import AXES
 from plumbline.ranking import LEANS, Finding, judge
+from plumbline.tables import TABLES, read
 
 Array = NDArray[np.float64]
 
+TRIALS = 2
+PIECES = 6
 ROUNDS = 3  # times that what is settled is taken out of the channels and found again
 NEAR = 0.02  # [1] to which the lever per acceleration is found
 BODIES = (0.8, 1.5)  # [1] lever per acceleration in parts of z/g: rigid bodies and people who counter-rotate
 WORTH = 0.3  # [1] of the size that matters, from which on a settled effect is taken out
 
 
-def settled(
+def of_part(
     signals: pd.DataFrame, pushes: pd.DataFrame, coverage: pd.DataFrame, effects: Catalogue, evaluation: Mapping[str, Any]
-) -> Iterator[tuple[list[Weak], Finding]]:
-    """Windows of each subject and axis, what is always fitted taken out of the channels exactly; and what that subject's data say.
+) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
+    """Tables `evidence`, `judged` and `candidates` of whole subjects, each judged alone."""
+    plant = plant_effects(effects)
+    windows: list[Weak] = []
+    rows: list[findings.Row] = []
+    tried: list[findings.Row] = []
+    for subject in sorted(coverage["subject"].unique()):
+        mine = coverage[coverage["subject"] == subject]
+        for axis in AXES:
+            got, finding = settled(signals, pushes, mine, effects, evaluation, axis)
+            windows += got
+            if finding is None:
+                rows.append(findings.unjudged(axis, subject, sizes([got]), too_few([got])))
+                continue
+            rows.append(findings.judged(axis, subject, finding, sizes([got]), gravity(got), lever(finding, got)))
+            tried += findings.candidates(axis, subject, finding, plant)
+    return evidence.to_table(windows), _table("judged", rows), _table("candidates", tried)
+
+
+def of_cohort(
+    evidence_of: Mapping[str, pd.DataFrame], alone: pd.DataFrame, tried: pd.DataFrame, effects: Catalogue
+) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Tables `judged` and `candidates` of all subjects, with rows for all of them together (subject `all`).
+
+    evidence_of: subject -> rows of `evidence`; asked for one by one.  alone, tried: the tables of all parts.
+    """
+    plant = plant_effects(effects)
+    rows, more = [alone], [tried]
+    for axis in AXES:
+        able = alone[(alone["axis"] == axis) & (alone["reason"] == "")]
+        if len(able) == 1:
+            rows.append(able.assign(subject="all"))
+            more.append(tried[(tried["axis"] == axis) & (tried["subject"] == able["subject"].iloc[0])].assign(subject="all"))
+        elif len(able):
+            each = [list(evidence.from_table(t[t["axis"] == axis])) for t in (evidence_of[s] for s in able["subject"])]
+            finding = together(each, able["h"].tolist(), plant)
+            w2 = float(np.mean([gravity(w) for w in each]))
+            rows.append(_table("judged", [findings.judged(axis, "all", finding, sizes(each), w2, float(able["h"].mean()))]))
+            more.append(_table("candidates", list(findings.candidates(axis, "all", finding, plant))))
+        else:
+            said = alone.loc[alone["axis"] == axis, "reason"]
+            why = said.iloc[0] if len(said) else "no trial could be used"
+            rows.append(_table("judged", [findings.unjudged(axis, "all", (0, 0), why)]))
+    return pd.concat(rows, ignore_index=True), pd.concat(more, ignore_index=True)
+
+
+def plant_effects(effects: Mapping[str, Effect]) -> dict[str, Effect]:
+    """Those of the plant ledger."""
+    return {k: e for k, e in effects.items() if e.ledger == "plant"}
+
+
+def _table(name: str, rows: Sequence[findings.Row]) -> pd.DataFrame:
+    return pd.DataFrame(rows, columns=[c.name for c in TABLES[name]])
+
+
+def sizes(each: Sequence[Sequence[Weak]]) -> tuple[int, int]:
+    """Trials, and independent pieces of them."""
+    return sum(map(len, each)), sum(len(np.unique(w.cluster)) for ws in each for w in ws)
+
+
+def too_few(each: Sequence[Sequence[Weak]]) -> str:
+    """Why some windows cannot be judged, and what is needed; empty where they can."""
+    trials, pieces = sizes(each)
+    if trials >= TRIALS and pieces >= PIECES:
+        return ""
+    return (
+        f"{trials} trial{'s' * (trials != 1)} with {pieces} independent piece{'s' * (pieces != 1)} of at most 5 s; "
+        f"at least {TRIALS} trials with {PIECES} pieces are needed to leave any out and still tell chance from cause"
+    )
+
+
+def settled(
+    signals: pd.DataFrame, pushes: pd.DataFrame, coverage: pd.DataFrame, effects: Catalogue, evaluation: Mapping[str, Any], axis: str
+) -> tuple[list[Weak], Finding | None]:
+    """Windows of one subject and axis, what is always fitted taken out of the channels exactly; and what they say, None for too few.
 
     A delay is known only to first order at a time; taken out and found again, the rest is small.
     """
-    plant = {k: e for k, e in effects.items() if e.ledger == "plant"}
-    for subject in sorted(coverage["subject"].unique()):
-        mine = coverage[coverage["subject"] == subject]
-        for axis in ("lateral", "forward"):
-            yield from _settled(signals, pushes, mine, effects, plant, evaluation, axis)
-
-
-def _settled(
-    signals: pd.DataFrame, pushes: pd.DataFrame, coverage: pd.DataFrame, effects: Catalogue, plant: Mapping[str, Effect],
-    evaluation: Mapping[str, Any], axis: str,
-) -> Iterator[tuple[list[Weak], Finding]]:  # fmt: skip
+    plant = plant_effects(effects)
     out: dict[str, Array] = {}
-    h = 0.0
+    h, finding = 0.0, None
     for _ in range(ROUNDS):
         windows = list(evidence.of_part(signals, pushes, coverage, effects, evaluation, undo=out, axis=axis))
-        if len(windows) < 2:
-            return
+        if too_few([windows]):
+            return windows, None
         finding = judge([windows], plant, [gravity(windows)], [h] if h else ())
         before, out = out, _taken(finding, plant)
         last, h = h or LEANS / gravity(windows), lever(finding, windows)
         if not _moved(before, out, plant) and abs(h / last - 1) < NEAR:
             break
-    yield windows, finding
+    return windows, finding
 
 
 def together(each: Sequence[Sequence[Weak]], h: Sequence[float], plant: Mapping[str, Effect]) -> Finding:
@@ -82,3 +150,20 @@ def _moved(before: Mapping[str, Array], after: Mapping[str, Array], plant: Mappi
     """Whether what is taken out differs from what was."""
     least = {k: WORTH * plant[k].parameters[0].matters for k in {*before, *after}}
     return any(np.max(np.abs(after.get(k, np.zeros(1)) - before.get(k, np.zeros(1)))) > size for k, size in least.items())
+
+
+class Shelf(Mapping[str, pd.DataFrame]):
+    """Rows of `evidence` of one subject at a time, read when they are asked for: memory does not grow with the cohort."""
+
+    def __init__(self, files: Sequence[str | Path]) -> None:
+        self.where = {str(s): f for f in files for s in read("evidence", f, columns=["subject"])["subject"].unique()}
+
+    def __getitem__(self, subject: str) -> pd.DataFrame:
+        table = read("evidence", self.where[subject])
+        return table[table["subject"] == subject]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.where)
+
+    def __len__(self) -> int:
+        return len(self.where)

@@ -11,7 +11,8 @@ Without shear there is only the whole equation, :math:`(x - p) - h\,\ddot x`. Ev
 windows are all that the search needs.
 """
 
-from collections.abc import Iterator, Mapping
+import json
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ from plumbline.effects import Catalogue, Channels, Effect, where
 from plumbline.effects._channels import of_trial
 from plumbline.plant import AXES, Plant, of_trials
 from plumbline.shapes import SHAPES
+from plumbline.tables import joined
 from plumbline.weak import Bump, white_noise_sd
 
 Array = NDArray[np.float64]
@@ -193,3 +195,58 @@ def _parts(effect: Effect, c: Channels) -> dict[str, Array]:
 
 def _with(c: Channels, w2: float) -> Channels:
     return replace(c, w2=w2)
+
+
+# -- table ------------------------------------------------------------------------------------------------------------
+
+
+def to_table(windows: Iterable[Weak]) -> pd.DataFrame:
+    """Table `evidence`: one row per window; columns of zeros are left out."""
+    return joined("evidence", [_rows(w) for w in windows])
+
+
+def _rows(w: Weak) -> pd.DataFrame:
+    b = w.bump
+    out: dict[str, Any] = {
+        "trial": w.trial, "subject": w.subject, "task": w.task, "condition": w.condition, "axis": w.axis, "frame": w.frame, "time": w.time,
+        "cluster": w.cluster, "com": w.com, "velocity": w.velocity, "zmp": w.zmp, "acceleration": w.acceleration, "force": w.force,
+        "vertical": w.vertical, "mass": w.mass, "height": w.height, "rate": b.rate, "half_width": b.half_width, "exponent": b.exponent,
+        **{f"noise_{k}": v for k, v in w.noise.items()}, "feet": w.feet,
+        "centre": json.dumps({k: v.tolist() for k, v in w.centre.items()}), "lacking": json.dumps(w.lacking),
+    }  # fmt: skip
+    for name, parts in w.terms.items():
+        for part, values in parts.items():
+            out |= {f"{name}.{k}:{part}": column for k, column in enumerate(values.T) if part == "plain" or column.any()}
+    return pd.DataFrame(out)
+
+
+def from_table(table: pd.DataFrame) -> Iterator[Weak]:
+    """Windows of each trial and axis of the table `evidence`."""
+    sizes: dict[str, int] = {}
+    for column in table.columns:
+        if column.endswith(":plain"):
+            name, k = column.removesuffix(":plain").rsplit(".", 1)
+            sizes[name] = max(sizes.get(name, 0), int(k) + 1)
+    for key, rows in table.groupby(["subject", "axis", "trial"], sort=True, observed=True):
+        yield _weak(str(key[2]), rows, sizes)
+
+
+def _weak(trial: str, rows: pd.DataFrame, sizes: Mapping[str, int]) -> Weak:
+    first, lacking = rows.iloc[0], json.loads(rows["lacking"].iloc[0])
+    nothing = np.zeros(len(rows))
+    terms = {
+        name: {
+            part: np.column_stack([np.nan_to_num(rows.get(f"{name}.{k}:{part}", nothing)) for k in range(size)]) for part in PARTS
+        }
+        for name, size in sizes.items() if name not in lacking
+    }  # fmt: skip
+    texts = {k: str(first[k]) for k in ("subject", "task", "condition", "axis")}
+    arrays = {k: rows[k].to_numpy() for k in ("frame", "time", "cluster", "com", "velocity", "zmp", "acceleration", "force", "vertical")}
+    numbers = {k: float(first[k]) for k in ("mass", "height", "feet")}
+    made: dict[str, Any] = {"trial": trial, **texts, **arrays, **numbers, "terms": terms, "lacking": lacking}
+    return Weak(
+        **made,
+        noise={k: float(first[f"noise_{k}"]) for k in ("x", "p", "z", "fx", "fz")},
+        bump=Bump(float(first["half_width"]), int(first["exponent"]), float(first["rate"])),
+        centre={k: np.array(v) for k, v in json.loads(first["centre"]).items()},
+    )

@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -192,7 +192,20 @@ def judge(mine: Sequence[Windows], evaluation: Mapping[str, Any]) -> Iterator[di
             yield _judged(w, fold, _w2(w, got.w2, evaluation), offset)
 
 
-def folds(mine: Sequence[Windows], evaluation: Mapping[str, Any]) -> Iterator[tuple[int, list[Windows], list[Windows]]]:
+class Named(Protocol):
+    """A trial, and what the config may call it."""
+
+    @property
+    def trial(self) -> str: ...  # noqa: D102
+
+    @property
+    def names(self) -> frozenset[str]: ...  # noqa: D102
+
+
+T = TypeVar("T", bound=Named)
+
+
+def folds(mine: Sequence[T], evaluation: Mapping[str, Any]) -> Iterator[tuple[int, list[T], list[T]]]:
     """(number, training trials, test trials): eight folds of whole trials (one by one when fewer), or as the config asks."""
     if evaluation["train"] or evaluation["test"]:
         train = [w for w in mine if not evaluation["train"] or w.names & set(evaluation["train"])]

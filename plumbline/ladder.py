@@ -1,12 +1,15 @@
 """The ladder: held-out error of each model, and the verdict other programs read."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from plumbline import control_verdict, findings
+from plumbline.effects import Effect
 from plumbline.plant import AXES
 from plumbline.tables import TABLES
 
@@ -15,25 +18,47 @@ Array = NDArray[np.float64]
 RESAMPLES = 2000
 SEED = 20130101  # the intervals are the same at each run
 
-NOT_BUILT = "not judged yet: this version measures the paper's equation and does not search for missing effects"
-
-
 NOTHING = {"kind": "weak"} | dict.fromkeys(("error_mm", "ci_low_mm", "ci_high_mm", "noise_floor_mm"), float("nan"))
 """The base rung where no trial could be judged."""
 
 
-def ladder(heldout: pd.DataFrame) -> pd.DataFrame:
-    """Table `ladder`: the base rung, pooled and per task, subject and condition, weak and free-run.
+def ladder(heldout: pd.DataFrame, rungs: pd.DataFrame, control: pd.DataFrame, effects: Mapping[str, Effect]) -> pd.DataFrame:
+    """Table `ladder`: the base rung and one per model, pooled and per task, subject and condition, weak and free-run; then the control ledger.
 
-    heldout: the table of all parts. Errors are pooled as rms over test functions (frames for the free run), in mm.
+    heldout, rungs, control: tables of all parts. Errors are pooled as rms over test functions (frames for the free run), in mm.
     """
     rows: list[dict[str, Any]] = []
+    noise = heldout[["trial", "axis", "noise_variance"]]
     for axis in AXES:
         mine = heldout[heldout["axis"] == axis]
         for task, subject, condition, group in _groups(mine):
             key = {"axis": axis, "task": task, "subject": subject, "condition": condition}
-            rows += [{"ledger": "plant", **key, "model": "base", "effects": "", **r} for r in rungs(group) or [NOTHING]]
+            rows += [{"ledger": "plant", **key, "model": "base", "effects": "", **r} for r in rungs_of(group) or [NOTHING]]
+        above = rungs[rungs["axis"] == axis].merge(noise, on=["trial", "axis"])
+        for (_, model, names), mine in above.groupby(["rung", "model", "effects"], sort=True, observed=True):
+            for task, subject, condition, group in _groups(mine):
+                key = {"axis": axis, "task": task, "subject": subject, "condition": condition}
+                rows += [{"ledger": "plant", **key, "model": model, "effects": names, **r} for r in rungs_of(group)]
+    rows += control_rungs(control, effects)
     return pd.DataFrame(rows, columns=[c.name for c in TABLES["ladder"]])
+
+
+def control_rungs(control: pd.DataFrame, effects: Mapping[str, Effect]) -> Iterator[dict[str, Any]]:
+    """Rungs of the control ledger: the base law, and each effect found; error of the simulated CoM on loci left out."""
+    scopes = [("all", control), *((str(s), rows) for s, rows in control.groupby("subject", observed=True))]
+    for subject, rows in scopes:
+        said = control_verdict.judge(rows, (), effects)
+        if said["missing"] is None:
+            continue
+        names: list[str] = []
+        for entry in [None, *said["missing"]]:
+            names += [entry["effect"]] if entry else []
+            key = {"axis": "lateral", "task": "all", "subject": subject, "condition": "all"}
+            errors = control_verdict.errors(rows, names)
+            yield {
+                "ledger": "control", **key, "kind": "free_run", "model": "+ " + names[-1] if names else "base", "effects": ", ".join(names),
+                **errors, "noise_floor_mm": said["noise_floor_mm"],
+            }  # fmt: skip
 
 
 def _groups(table: pd.DataFrame) -> Iterator[tuple[str, str, str, pd.DataFrame]]:
@@ -46,7 +71,7 @@ def _groups(table: pd.DataFrame) -> Iterator[tuple[str, str, str, pd.DataFrame]]
         yield "all", "all", str(condition), group
 
 
-def rungs(group: pd.DataFrame) -> list[dict[str, Any]]:
+def rungs_of(group: pd.DataFrame) -> list[dict[str, Any]]:
     """Error, interval and floor of one group of trials, weak and free-run; nothing for an empty group."""
     if group.empty:
         return []
@@ -76,60 +101,103 @@ def error_mm(square: Array, count: Array) -> dict[str, float]:
 # -- verdict ----------------------------------------------------------------------------------------------------------
 
 
-def verdict(table: pd.DataFrame, evaluation: Mapping[str, Any], coverage: pd.DataFrame, heldout: pd.DataFrame) -> dict[str, Any]:
+@dataclass(frozen=True)
+class Said:
+    """What the stages said, all parts: tables `ladder`, `coverage`, `heldout`, `judged`, `candidates`, `control`."""
+
+    ladder: pd.DataFrame
+    coverage: pd.DataFrame
+    heldout: pd.DataFrame
+    judged: pd.DataFrame
+    candidates: pd.DataFrame
+    control: pd.DataFrame
+
+
+def verdict(said: Said, evaluation: Mapping[str, Any], effects: Mapping[str, Effect], models: Sequence[tuple[str, Sequence[str]]]) -> dict[str, Any]:
     """The interface `results/verdict.json`: the lateral axis pooled on top, then by axis and by subject.
 
-    table: the ladder.  coverage: says why a floor or an error is absent.  heldout: which trials were judged.
+    effects: the catalogue.  models: of the config, none for `auto`.
     """
-    by_axis = {axis: _blocks(table, axis, "all", coverage, heldout) for axis in AXES}
-    subjects = sorted(coverage["subject"].unique())
+    by_axis = {axis: _blocks(said, axis, "all", effects, models) for axis in AXES}
+    subjects = sorted(said.coverage["subject"].unique())
     return {
         "schema_version": 1,
         "half_width_s": evaluation["half_width"],
-        "model": [],
+        "model": _model(said, "lateral", models),
         **by_axis["lateral"],
         "by_axis": by_axis,
-        "by_subject": {s: _blocks(table, "lateral", s, coverage[coverage["subject"] == s], heldout) for s in subjects},
+        "by_subject": {s: _blocks(said, "lateral", s, effects, models) for s in subjects},
     }
 
 
-def _blocks(table: pd.DataFrame, axis: str, subject: str, coverage: pd.DataFrame, heldout: pd.DataFrame) -> dict[str, Any]:
-    chosen = table[
-        (table["ledger"] == "plant") & (table["kind"] == "weak") & (table["model"] == "base") & (table["axis"] == axis)
-        & (table["subject"] == subject) & (table["task"] == "all") & (table["condition"] == "all")
-    ]  # fmt: skip
-    base = float(chosen["error_mm"].iloc[0]) if len(chosen) and chosen["error_mm"].notna().all() else None
-    floor = float(chosen["noise_floor_mm"].iloc[0]) if base is not None else None
-    judged = coverage["trial"].isin(heldout.loc[heldout["axis"] == axis, "trial"])
-    return {
-        "plant": _block(base, floor if floor == floor else None, _reason(base, floor, coverage, judged)),
-        "control": _block(None, None, "not judged yet: the controller is not identified in this version"),
-    }
+def _model(said: Said, axis: str, models: Sequence[tuple[str, Sequence[str]]]) -> list[str]:
+    """Effects of the last model configured; with `auto` those found."""
+    if models:
+        return list(models[-1][1])
+    found = said.candidates[(said.candidates["axis"] == axis) & (said.candidates["subject"] == "all") & (said.candidates["status"] == "found")]
+    plant = [str(e) for e in found["effect"] if e]
+    control = control_verdict.judge(said.control)["missing"] if axis == "lateral" else None
+    return [*plant, *(m["effect"] for m in control or [])]
 
 
-def _block(base: float | None, floor: float | None, reason: str) -> dict[str, Any]:
-    return {
-        "base_error_mm": base, "model_error_mm": base, "final_error_mm": None, "noise_floor_mm": floor,
-        "missing": None, "unexplained": None, "description": "", "reason": reason,
+def _blocks(said: Said, axis: str, subject: str, effects: Mapping[str, Effect], models: Sequence[tuple[str, Sequence[str]]]) -> dict[str, Any]:
+    model = _model(said, axis, models)
+    return {"plant": _plant(said, axis, subject, effects, model), "control": _control(said, axis, subject, effects, model)}
+
+
+def _plant(said: Said, axis: str, subject: str, effects: Mapping[str, Effect], model: Sequence[str]) -> dict[str, Any]:
+    coverage = said.coverage if subject == "all" else said.coverage[said.coverage["subject"] == subject]
+    rungs = said.ladder[
+        (said.ladder["ledger"] == "plant") & (said.ladder["kind"] == "weak") & (said.ladder["axis"] == axis)
+        & (said.ladder["subject"] == subject) & (said.ladder["task"] == "all") & (said.ladder["condition"] == "all")
+    ].dropna(subset=["error_mm"])  # fmt: skip
+    base = rungs[rungs["model"] == "base"]
+    if base.empty:
+        return blank(f"no held-out error: {_why_no_error(coverage)}")
+    floor = float(base["noise_floor_mm"].iloc[0])
+    errors = {
+        "base_error_mm": float(base["error_mm"].iloc[0]), "model_error_mm": float(rungs["error_mm"].iloc[-1]),
+        "final_error_mm": None, "noise_floor_mm": floor if floor == floor else None,
     }  # fmt: skip
+    notes = _notes(floor, coverage, coverage["trial"].isin(said.heldout.loc[said.heldout["axis"] == axis, "trial"]))
+    about = said.judged[(said.judged["axis"] == axis) & (said.judged["subject"] == subject)]
+    if about.empty or about["reason"].iloc[0]:
+        why = about["reason"].iloc[0] if len(about) else "no trial could be used"
+        return blank("; ".join([f"not judged: {why}", *notes])) | errors
+    rows = said.candidates[(said.candidates["axis"] == axis) & (said.candidates["subject"] == subject)]
+    out = errors | findings.block(about.iloc[0], rows, effects, model)
+    if not out["missing"] and not out["unexplained"]:
+        out["final_error_mm"] = errors["base_error_mm"]
+    return out | {"reason": "; ".join([out["reason"], *notes])}
 
 
-def _reason(base: float | None, floor: float | None, coverage: pd.DataFrame, judged: "pd.Series[bool]") -> str:
-    """Why nothing more is said.  judged: the rows of `coverage` that a held-out error stands behind."""
-    if base is None:
-        return f"no held-out error: {_why_no_error(coverage)}"
-    said = NOT_BUILT
+def _control(said: Said, axis: str, subject: str, effects: Mapping[str, Effect], model: Sequence[str]) -> dict[str, Any]:
+    if axis != "lateral":
+        return blank("the controller is judged on the lateral axis alone")
+    rows = said.control if subject == "all" else said.control[said.control["subject"] == subject]
+    about = said.judged[(said.judged["axis"] == axis) & (said.judged["subject"] == subject)]
+    settled = about.empty or not (about["left"].iloc[0] or about["shapes"].iloc[0])
+    return control_verdict.judge(rows, model, effects, settled=bool(settled))
+
+
+def blank(reason: str) -> dict[str, Any]:
+    """A block that claims nothing."""
+    errors: dict[str, Any] = dict.fromkeys(("base_error_mm", "model_error_mm", "final_error_mm", "noise_floor_mm"))
+    return errors | {"missing": None, "unexplained": False, "description": "", "reason": reason}
+
+
+def _notes(floor: float, coverage: pd.DataFrame, judged: "pd.Series[bool]") -> Iterator[str]:
+    """What a reader must know beside.  judged: the rows of `coverage` that a held-out error stands behind."""
     able = (coverage["com_method"] != "none").sum()
     if judged.sum() < able:
         rest = "the others were not asked for, or no w2 could be found on the rest"
-        said += f"; {judged.sum()} of the {able} trials with a CoM were judged, {rest}"
+        yield f"{judged.sum()} of the {able} trials with a CoM were judged, {rest}"
     methods = coverage.loc[judged, "com_method"]
     if 0 < (methods == "force").sum() < len(methods):
         share = f"{(methods == 'force').sum()} of {len(methods)} judged trials"
-        said += f"; in {share} the CoM was integrated from the force and follows it by assumption"
+        yield f"in {share} the CoM was integrated from the force and follows it by assumption"
     if floor != floor:
-        said += f"; the noise floor is not identifiable: {_why_no_floor(coverage[judged])}"
-    return said
+        yield f"the noise floor is not identifiable: {_why_no_floor(coverage[judged])}"
 
 
 def _why_no_error(coverage: pd.DataFrame) -> str:

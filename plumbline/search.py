@@ -1,7 +1,7 @@
 """Regressions over sets of effects from sums of products, and the search for the set that predicts trials left out."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -23,7 +23,7 @@ class Sums:
 
     equations: their names.  columns: (effect, number) of each of the P columns, base first.  gram (E, C, P, P), right (E, C, P),
     square (E, C), count (E, C): over the windows of piece c in equation e.  trial: index of each piece's trial, (C,).  trials: their ids.
-    floor: variance that sensor noise gives, (E, C).  w2: at which the columns were made [1/s2].
+    floor: variance that sensor noise gives, (E, C).  w2, h: with which the columns were made [1/s2], [s2].
     """
 
     equations: tuple[str, ...]
@@ -37,6 +37,7 @@ class Sums:
     floor: Array
     w2: float
     mass: float
+    h: float
 
     def of(self, effects: Iterable[str]) -> Index:
         """Columns of the base and of some effects."""
@@ -86,7 +87,7 @@ def sums(windows: Sequence[Weak], effects: Sequence[str], w2: float, h: float = 
     trial = np.array([i for i, _, _ in pieces])
     names = tuple(w.trial for w in windows)
     mass = float(np.mean([w.mass for w in windows]))
-    return Sums(equations, tuple(columns), out["gram"], out["right"], square, count, trial, names, floor, w2, mass)
+    return Sums(equations, tuple(columns), out["gram"], out["right"], square, count, trial, names, floor, w2, mass, h)
 
 
 def design(w: Weak, equation: str, effects: Sequence[str], w2: float, h: float) -> tuple[Array, Array]:
@@ -179,8 +180,10 @@ class Fit:
         return self.theta[here], self.covariance[np.ix_(here, here)]
 
 
-def fit(s: Sums, weight: Array, columns: Index, *, among: Array | None = None) -> Fit:
-    """Weighted least squares.  among: pieces used (mask), None for all."""
+def fit(s: Sums, weight: Array, columns: Index, *, among: NDArray[np.bool_] | None = None, known: Mapping[int, float] | None = None) -> Fit:
+    """Weighted least squares.  among: pieces used (mask), None for all.  known: column -> coefficient that is not fitted."""
+    if known:
+        return _with_known(s, weight, columns, among, known)
     use = np.ones(len(s.trial), bool) if among is None else among
     gram = np.einsum("e,ecij->cij", weight, s.gram[:, use][:, :, columns[:, None], columns])
     right = np.einsum("e,eci->ci", weight, s.right[:, use][:, :, columns])
@@ -192,6 +195,18 @@ def fit(s: Sums, weight: Array, columns: Index, *, among: Array | None = None) -
     bread = np.linalg.pinv(gram.sum(0), rcond=1e-14, hermitian=True)
     factor = len(groups) / max(len(groups) - 1, 1)
     return Fit(columns, theta, factor * bread @ (by_group.T @ by_group) @ bread, len(groups))
+
+
+def _with_known(s: Sums, weight: Array, columns: Index, among: NDArray[np.bool_] | None, known: Mapping[int, float]) -> Fit:
+    """A fit with some coefficients given, their part taken to the left side."""
+    given = np.array(list(known), int)
+    right = s.right - s.gram[..., given] @ np.array(list(known.values()))
+    got = fit(replace(s, right=right), weight, np.setdiff1d(columns, given), among=among)
+    theta = np.array([known[c] if c in known else got.theta[np.searchsorted(got.columns, c)] for c in columns])
+    covariance = np.zeros((len(columns), len(columns)))
+    free = np.flatnonzero(~np.isin(columns, given))
+    covariance[np.ix_(free, free)] = got.covariance
+    return Fit(columns, theta, covariance, got.clusters)
 
 
 def residual_variance(s: Sums, weight: Array, columns: Index) -> Array:

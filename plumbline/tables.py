@@ -316,6 +316,90 @@ TABLES: dict[str, list[Column]] = {
             "sum of squares of the error [m2]; of its power density [m2/Hz] in view frequency",
         ),
     ],
+    # -- criticism: what each effect would add, window by window; what the data of a subject say; the error of each model
+    "evidence": [
+        *KEY,
+        _c("axis", "str", "", "lateral or forward"),
+        _c("frame", "int", "", "centre of the test function, from 0 within the trial"),
+        _c("time", "float", "s", "from the trial's start"),
+        _c("cluster", "int", "", "independent piece of the trial"),
+        _c("com", "float", "m", "mean of the CoM under the test function"),
+        _c("velocity", "float", "m/s", "weak velocity of the CoM"),
+        _c("zmp", "float", "m", "mean of the ZMP"),
+        _c("acceleration", "float", "m/s2", "weak acceleration of the CoM"),
+        _c("force", "float", "m/s2", "mean of the shear force over the mass, NaN without shear"),
+        _c("vertical", "float", "m/s2", "weak z'' + g less the vertical force over the mass"),
+        _c("mass", "float", "kg", "body mass"),
+        _c("height", "float", "m", "mean height of the CoM over the plates"),
+        _c("rate", "float", "Hz", "rate of the frames"),
+        _c("half_width", "float", "s", "of the test function"),
+        _c("exponent", "int", "", "of the test function"),
+        *[
+            _c(f"noise_{k}", "float", u, f"sd of the white noise of {w}, NaN where not known")
+            for k, u, w in (
+                ("x", "m", "the CoM"),
+                ("p", "m", "the ZMP"),
+                ("z", "m", "its height"),
+                ("fx", "N", "the shear"),
+                ("fz", "N", "the vertical force"),
+            )
+        ],
+        _c("feet", "float", "m", "CoP of both plates from the middles of their feet, mean of the trial"),
+        _c("centre", "str", "", "JSON: effect -> coefficients taken out of the channels first"),
+        _c("lacking", "str", "", "JSON: effect -> what it needs and the trial lacks"),
+    ],
+    "judged": [
+        _c("axis", "str", "", "lateral or forward"),
+        _c("subject", "str", "", "participant_id, or all"),
+        _c("trials", "int", "", "trials judged"),
+        _c("pieces", "int", "", "independent pieces of at most 5 s"),
+        _c("base", "float", "m", "held-out error of the paper's equation in this search"),
+        _c("final", "float", "m", "held-out error with all that is missing"),
+        _c("floor", "float", "m", "what sensor noise alone gives, NaN where not known"),
+        _c("w2", "float", "1/s2", "g over the height of the CoM"),
+        _c("h", "float", "s2", "lever per acceleration, one over the w2 found"),
+        _c("over", "str", "", "JSON: equation -> residual over noise floor and usual faults"),
+        _c("left", "str", "", "equations in which more is left, joined by ', '"),
+        _c("shapes", "str", "", "shapes without a cause that the residual needs, joined by ', '"),
+        _c("refused", "str", "", "JSON: impostors, list of [effects, error in m, reason]"),
+        _c("theta", "str", "", "JSON: effect or base column -> coefficients of the last model; empty where pooled"),
+        _c("reason", "str", "", "why nothing is said; empty where it is"),
+    ],
+    "candidates": [
+        _c("axis", "str", "", "lateral or forward"),
+        _c("subject", "str", "", "participant_id, or all"),
+        _c("effect", "str", "", "id; empty where only a family can be told"),
+        _c("status", "str", "", "found, alike, settled, idle, refused, absorbed or lacking"),
+        _c("family", "str", "", "what these data cannot tell it from, itself first, joined by ', '; empty where not found"),
+        _c("before", "float", "m", "held-out error without it, of what was found"),
+        _c("after", "float", "m", "held-out error with it"),
+        _c("fall_low", "float", "m", "lower end of the 95 % interval of the fall it brings beside what was found"),
+        _c("fall_high", "float", "m", "upper end"),
+        _c("q", "float", "1", "false discovery rate over the catalogue (Benjamini and Hochberg 1995)"),
+        _c("vif", "float", "1", "variance inflation beside the final model"),
+        _c("trials_80", "float", "", "trials that find such an effect with 80 % power"),
+        _c("parameters", "str", "", "JSON: name -> value, unit, ci95"),
+        _c("reason", "str", "", "why it is not named"),
+    ],
+    "rungs": [
+        *KEY,
+        _c("axis", "str", "", "lateral or forward"),
+        _c("rung", "int", "", "number of the model, from 1; the paper's equation stands in `heldout`"),
+        _c("model", "str", "", "its name"),
+        _c("effects", "str", "", "effects in it, joined by ', '"),
+        _c("windows", "int", "", "test functions"),
+        _c("square_sum", "float", "m2", "sum of squared errors as ZMP"),
+        _c("free_run_frames", "int", "", "frames of the free run"),
+        _c("free_run_square_sum", "float", "m2", "sum of squared misses of the CoM"),
+    ],
+    "contributions": [
+        *KEY,
+        _c("axis", "str", "", "lateral or forward"),
+        _c("frame", "int", "", "from 0 within the trial"),
+        _c("time", "float", "s", "from the trial's start"),
+        _c("com", "float", "m", "mean of the CoM under the test function"),
+        _c("velocity", "float", "m/s", "weak velocity of the CoM"),
+    ],
     # -- cohort
     "ladder": [
         _c("ledger", "str", "", "plant, control or robot"),
@@ -340,6 +424,14 @@ TABLES: dict[str, list[Column]] = {
 }
 
 
+OPEN = {
+    "evidence": ("effect.number:part, the column of a coefficient: force [m/s2] on the kinematic side, plain [m/s2] and by_w2 [m] on the "
+                 "moment side, vertical [m/s2]; all per unit of the coefficient", ""),
+    "contributions": ("before: error of the paper's equation; after name: error of that model; effect id: what it adds", "m"),
+}  # fmt: skip
+"""Tables that have columns of floats beside their own: meaning, unit."""
+
+
 class Stamp(NamedTuple):
     """Who made a table: digest of the code, the config section."""
 
@@ -350,9 +442,11 @@ class Stamp(NamedTuple):
 _ARROW = {"str": pa.string(), "int": pa.int64(), "float": pa.float64(), "bool": pa.bool_()}
 
 
-def schema(name: str) -> pa.Schema:
-    """Arrow schema of a table, with unit and meaning of each column in its metadata."""
-    return pa.schema([pa.field(c.name, _ARROW[c.kind], metadata={"unit": c.unit, "meaning": c.meaning}) for c in TABLES[name]])
+def schema(name: str, more: Iterable[str] = ()) -> pa.Schema:
+    """Arrow schema of a table, with unit and meaning of each column in its metadata.  more: columns of an open table."""
+    meaning, unit = OPEN.get(name, ("", ""))
+    columns = [*TABLES[name], *(_c(k, "float", unit, meaning) for k in more)]
+    return pa.schema([pa.field(c.name, _ARROW[c.kind], metadata={"unit": c.unit, "meaning": c.meaning}) for c in columns])
 
 
 def empty(name: str) -> pd.DataFrame:
@@ -375,11 +469,11 @@ class Writer:
     The file gets its name when the block ends well: a killed job leaves no half file.
     """
 
-    def __init__(self, name: str, path: str | Path, stamp: Stamp = NO_STAMP) -> None:
+    def __init__(self, name: str, path: str | Path, stamp: Stamp = NO_STAMP, more: Iterable[str] = ()) -> None:
         self.name, self.target = name, Path(path)
         self.temporary = self.target.with_name(f".{self.target.name}.{os.getpid()}")
         about = {"table": name, "code": stamp.code, "config": stamp.config or {}}
-        self.schema = schema(name).with_metadata({"plumbline": json.dumps(about, sort_keys=True)})
+        self.schema = schema(name, more).with_metadata({"plumbline": json.dumps(about, sort_keys=True)})
 
     def __enter__(self) -> "Writer":
         self.target.parent.mkdir(parents=True, exist_ok=True)
@@ -405,7 +499,9 @@ class Writer:
 
 def write(name: str, frame: pd.DataFrame, path: str | Path, stamp: Stamp = NO_STAMP) -> None:
     """Write a whole table.  Raises PlumblineError where the columns are not those of :data:`TABLES`."""
-    with Writer(name, path, stamp) as out:
+    own = {c.name for c in TABLES[name]}
+    more = [k for k in frame.columns if k not in own] if name in OPEN else []
+    with Writer(name, path, stamp, more) as out:
         if len(frame.columns):
             out.append(frame)
 

@@ -1,0 +1,136 @@
+"""What was found as rows of the tables `judged` and `candidates`, and from them as blocks of the verdict."""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from plumbline.effects import Effect
+from plumbline.ranking import Candidate, Finding, Found
+from plumbline.shapes import SHAPES
+
+Row = dict[str, Any]
+
+WHERE = {
+    "kinematic": "the acceleration of the CoM against the shear force (the kinematic side)",
+    "moment": "the ZMP against the shear force (the moment side)",
+    "whole": "the ZMP against the acceleration of the CoM",
+}
+
+
+def judged(axis: str, subject: str, finding: Finding, sizes: tuple[int, int], w2: float, h: float) -> Row:
+    """Row of `judged`.  sizes: trials and pieces."""
+    theta = {k: v.tolist() for k, v in finding.theta[0].items()} if len(finding.theta) == 1 else {}
+    return {
+        "axis": axis, "subject": subject, "trials": sizes[0], "pieces": sizes[1], "base": finding.base, "final": finding.final,
+        "floor": finding.floor, "w2": w2, "h": h, "over": json.dumps(finding.over), "left": ", ".join(finding.left),
+        "shapes": ", ".join(finding.shapes), "refused": json.dumps([[r.effects, _plain(r.error), r.reason] for r in finding.refused]),
+        "theta": json.dumps(theta), "reason": "",
+    }  # fmt: skip
+
+
+def unjudged(axis: str, subject: str, sizes: tuple[int, int], reason: str) -> Row:
+    """Row of `judged` where nothing can be said."""
+    numbers: Row = dict.fromkeys(("base", "final", "floor", "w2", "h"), float("nan"))
+    texts: Row = {"over": "{}", "left": "", "shapes": "", "refused": "[]", "theta": "{}", "reason": reason}
+    return {"axis": axis, "subject": subject, "trials": sizes[0], "pieces": sizes[1], **numbers, **texts}
+
+
+def candidates(axis: str, subject: str, finding: Finding, effects: Mapping[str, Effect]) -> Iterator[Row]:
+    """Rows of `candidates`: what was found, the largest fall first, then the others by name."""
+    about = {"axis": axis, "subject": subject}
+    by_name = {c.effect: c for c in finding.candidates}
+    found = sorted(finding.found, key=lambda f: f.after - f.before)
+    for one in found:
+        yield about | _found(one, by_name.get(one.effect, Candidate(one.effect, "found", q=one.q)), effects)
+    for candidate in finding.candidates:
+        if candidate.effect not in {f.effect for f in found}:
+            yield about | _tried(candidate)
+
+
+def _found(one: Found, candidate: Candidate, effects: Mapping[str, Effect]) -> Row:
+    units = {p.name: p.unit for p in effects[one.effect].parameters} if one.effect else {}
+    parameters = {k: {"value": v[0], "unit": units.get(k, ""), "ci95": [v[1], v[2]]} for k, v in one.parameters.items()}
+    return _tried(candidate) | {
+        "status": "found", "family": ", ".join(one.family), "before": one.before, "after": one.after, "q": one.q,
+        "parameters": json.dumps(parameters),
+    }  # fmt: skip
+
+
+def _tried(c: Candidate) -> Row:
+    return {
+        "effect": c.effect, "status": c.status, "family": "", "before": float("nan"), "after": c.error, "fall_low": c.low,
+        "fall_high": c.high, "q": c.q, "vif": c.vif, "trials_80": c.trials, "parameters": "{}", "reason": c.reason,
+    }  # fmt: skip
+
+
+def _plain(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+# -- blocks of the verdict --------------------------------------------------------------------------------------------
+
+
+def block(about: pd.Series, rows: pd.DataFrame, effects: Mapping[str, Effect], model: Sequence[str]) -> Row:
+    """What `judged` and `candidates` say of one axis and subject, as keys of the block `plant`; errors in mm.
+
+    about: the row of `judged`.  rows: of `candidates`.  model: effects of the configured model.
+    """
+    missing = [_entry(row, model) for _, row in rows[rows["status"] == "found"].iterrows()]
+    unexplained = bool(about["left"] or about["shapes"])
+    refused = json.loads(about["refused"])
+    return {
+        "final_error_mm": 1e3 * float(about["final"]),
+        "missing": missing,
+        "unexplained": unexplained,
+        "description": describe(about) if unexplained else "",
+        "reason": reason(about, missing),
+        "refused": [
+            {"effects": names, "error_mm": None if error is None else 1e3 * error, "reason": said} for names, error, said in refused
+        ],
+        "cannot_judge": {
+            r["effect"]: r["reason"].removeprefix("cannot be judged: ") for _, r in rows[rows["status"] == "lacking"].iterrows()
+        },
+        "separate": list(_separate(missing, effects)),
+    }
+
+
+def _entry(row: pd.Series, model: Sequence[str]) -> Row:
+    q = float(row["q"])
+    family = str(row["family"]).split(", ")
+    return {
+        "effect": row["effect"] or None, "family": family, "in_model": row["effect"] in model,
+        "error_before_mm": 1e3 * float(row["before"]), "error_after_mm": 1e3 * float(row["after"]),
+        "parameters": json.loads(row["parameters"]), "q_value": q if np.isfinite(q) else None,
+    }  # fmt: skip
+
+
+def _separate(missing: Sequence[Row], effects: Mapping[str, Effect]) -> Iterator[str]:
+    """Recordings that would tell the members of each family apart."""
+    for entry in missing:
+        if len(entry["family"]) > 1:
+            ways = dict.fromkeys(effects[k].separated for k in entry["family"] if k in effects and effects[k].separated)
+            yield f"{' or '.join(entry['family'])}: {'; '.join(ways)}"
+
+
+def describe(about: pd.Series) -> str:
+    """Where something is left and what it looks like, without a cause."""
+    over = json.loads(about["over"])
+    places = [k for k in str(about["left"]).split(", ") if k] or [max((k for k in over if k in WHERE), key=lambda k: over[k])]
+    where = " and ".join(f"{WHERE[k]}, {over[k]:.1f} times what noise and a model's usual faults give" for k in places if k in WHERE)
+    shapes = [SHAPES[k].title for k in str(about["shapes"]).split(", ") if k]
+    like = f"; it looks like {', and '.join(shapes)}" if shapes else ""
+    return f"in {where}{like}; no listed effect explains it"
+
+
+def reason(about: pd.Series, missing: Sequence[Row]) -> str:
+    """Why the verdict is what it is."""
+    if about["left"] or about["shapes"]:
+        return "structure above the noise is left on trials left out"
+    if not np.isfinite(about["floor"]):
+        rest = "what is named falls by more than that between trials" if missing else "no effect lowers the error on trials left out"
+        return f"the noise floor is not known; {rest}"
+    named = "with what is missing " if missing else ""
+    return f"{named}held-out error is {about['final'] / about['floor']:.2f} of the noise floor"

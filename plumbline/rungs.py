@@ -1,0 +1,212 @@
+"""The ladder's rungs: error of each model on trials left out, its free run, what each effect contributes."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from plumbline import evidence
+from plumbline.contest import decisive, own, tolerance
+from plumbline.effects import Catalogue, Channels
+from plumbline.effects._channels import of_trial
+from plumbline.evidence import Weak
+from plumbline.fit import folds, free_runs
+from plumbline.physics import G
+from plumbline.plant import Plant, of_trials
+from plumbline.search import Fit, Sums, design, fit, sums
+from plumbline.study import names
+from plumbline.tables import joined
+
+Array = NDArray[np.float64]
+Models = Sequence[tuple[str, tuple[str, ...]]]
+
+NEAR = 3  # candidates that came nearest, whose contribution is drawn beside that of what was found
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What a trial is called."""
+
+    trial: str
+    names: frozenset[str]
+
+
+def models(config: Models, tried: pd.DataFrame, axis: str) -> list[tuple[str, tuple[str, ...]]]:
+    """Models of the ladder's rungs on one axis: those of the config; or what was found in all subjects, one after the other.
+
+    tried: the table `candidates`.
+    """
+    if config:
+        return list(config)
+    found = tried[(tried["axis"] == axis) & (tried["subject"] == "all") & (tried["status"] == "found") & (tried["effect"] != "")]
+    climbed = [str(e) for e in found["effect"]]
+    return [("+ " + climbed[k], tuple(climbed[: k + 1])) for k in range(len(climbed))]
+
+
+def of_part(
+    signals: pd.DataFrame, pushes: pd.DataFrame, coverage: pd.DataFrame, table: pd.DataFrame, judged: pd.DataFrame, tried: pd.DataFrame,
+    effects: Catalogue, config: Models, evaluation: Mapping[str, Any],
+) -> tuple[pd.DataFrame, pd.DataFrame]:  # fmt: skip
+    """Tables `rungs` and `contributions` of whole subjects.
+
+    table: `evidence` of the part.  judged, tried: tables `judged`, `candidates` of the cohort.  coverage: with the column `files`.
+    """
+    rungs: list[dict[str, Any]] = []
+    shown: list[pd.DataFrame] = []
+    for (subject, axis), rows in table.groupby(["subject", "axis"], sort=True, observed=True):
+        about = judged[(judged["subject"] == subject) & (judged["axis"] == axis) & (judged["reason"] == "")]
+        if about.empty:
+            continue
+        chosen = models(config, tried, str(axis))
+        near = _near(tried[(tried["axis"] == axis) & (tried["subject"] == "all")])
+        bench = _Bench(list(evidence.from_table(rows)), effects, {*near, *(e for _, es in chosen for e in es)}, about.iloc[0], evaluation)
+        plants = _plants(signals, pushes, coverage[coverage["subject"] == subject], str(axis), evaluation)
+        called = {str(r["trial"]): names(r["trial"], r["task"], str(r["files"]).split(" + ")) for _, r in coverage.iterrows()}
+        trials = [Trial(w.trial, frozenset(called[w.trial])) for w in bench.windows]
+        for number, (name, members) in enumerate(chosen, 1):
+            about_model = {"rung": number, "model": name, "effects": ", ".join(members)}
+            rungs += [row | about_model for row in bench.rung(members, trials, plants)]
+        shown.append(bench.contributions(chosen, near))
+    return joined("rungs", [pd.DataFrame(rungs)] if rungs else []), joined("contributions", shown)
+
+
+def _near(tried: pd.DataFrame) -> list[str]:
+    """What was found, and the candidates that would lower the error most beside it."""
+    found = [str(e) for e in tried.loc[tried["status"] == "found", "effect"] if e]
+    others = (
+        tried[tried["status"].isin(["idle", "refused", "settled"])].dropna(subset=["fall_high"]).sort_values("fall_high", ascending=False)
+    )
+    return [*found, *(str(e) for e in others["effect"].head(NEAR))]
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """Channels and plant of one trial."""
+
+    channels: Channels
+    plant: Plant
+
+
+def _plants(
+    signals: pd.DataFrame, pushes: pd.DataFrame, coverage: pd.DataFrame, axis: str, evaluation: Mapping[str, Any]
+) -> dict[str, _Motion]:  # fmt: skip
+    settings: dict[str, Any] = {k: evaluation[k] for k in ("half_width", "exponent")}
+    height = float(coverage["height_com"].mean())
+    return {
+        str(about["trial"]): _Motion(of_trial(frames, axis, float(about["mass"]), height), plants[axis])
+        for about, frames, plants in of_trials(signals, pushes, coverage, **settings, axes=(axis,))
+        if axis in plants
+    }
+
+
+class _Bench:
+    """Windows of one subject and axis, on which models are tried."""
+
+    def __init__(
+        self, windows: list[Weak], effects: Catalogue, wanted: set[str], about: pd.Series, evaluation: Mapping[str, Any]
+    ) -> None:  # fmt: skip
+        self.windows, self.effects, self.evaluation = windows, effects, evaluation
+        able = {k for k in windows[0].terms if all(k in w.terms for w in windows)}
+        self.offered = sorted(wanted & able)
+        self.w2, self.h = float(about["w2"]), float(about["h"])
+        self.sums = sums(windows, self.offered, self.w2, self.h)
+        self.weight = decisive(self.sums) / tolerance(self.sums)
+        self.fixed = evaluation["w2"] == "height"
+
+    def rung(self, members: Sequence[str], trials: Sequence[Trial], plants: Mapping[str, _Motion]) -> Iterator[dict[str, Any]]:
+        """Rows of `rungs` of one model."""
+        number = {w.trial: k for k, w in enumerate(self.windows)}
+        for _, train, test in folds(trials, self.evaluation):
+            got = self.fit(members, np.isin(self.sums.trial, [number[t.trial] for t in train]))
+            for t in test:
+                yield self._row(number[t.trial], got, members, plants.get(t.trial))
+
+    def fit(self, members: Sequence[str], among: NDArray[np.bool_] | None = None) -> Fit:
+        """Coefficients of a model over some pieces."""
+        columns = self.sums.of([m for m in members if m in self.offered])
+        known = {int(own(self.sums, "=h")[0]): self._height()} if self.fixed else {}
+        return fit(self.sums, self.weight, columns, among=among, known=known)
+
+    def _height(self) -> float:
+        """z over g at the mean height [s2]."""
+        return float(np.mean([w.height for w in self.windows])) / G
+
+    def _row(self, k: int, got: Fit, members: Sequence[str], motion: _Motion | None) -> dict[str, Any]:
+        w = self.windows[k]
+        error = self.error(w, got, members)
+        miss = self._free(got, members, motion) if motion is not None else np.zeros(0)
+        return {
+            "trial": w.trial, "subject": w.subject, "task": w.task, "condition": w.condition, "axis": w.axis, "windows": len(error),
+            "square_sum": float(error @ error), "free_run_frames": len(miss), "free_run_square_sum": float(miss @ miss),
+        }  # fmt: skip
+
+    def error(self, w: Weak, got: Fit, members: Sequence[str]) -> Array:
+        """Error of a model's equation in each window, as ZMP [m]: (x - p) less what the model gives."""
+        one = sums_design(w, self.offered, self.sums)
+        theta = self._used(got, members)
+        return np.asarray(one[1] - one[0] @ theta)
+
+    def _used(self, got: Fit, members: Sequence[str]) -> Array:
+        """Coefficients of all columns, the constants only where the model has an effect that is one."""
+        theta = np.zeros(len(self.sums.columns))
+        theta[got.columns] = got.theta
+        theta[own(self.sums, *self._silent(members))] = 0.0
+        return theta
+
+    def _silent(self, members: Sequence[str]) -> set[str]:
+        """Constants that stay in the residual."""
+        if self.evaluation["offset"] == "train" or any(p.name == "x" for m in members for p in self.effects[m].parameters):
+            return set()
+        out = set() if "com_bias" in members or "offset" in members else {"=moment"}
+        return out if "tilt" in members else {*out, "=kinematic"}
+
+    def _free(self, got: Fit, members: Sequence[str], motion: _Motion) -> Array:
+        """Free run less the CoM as measured, frame by frame [m]."""
+        theta = dict(zip([n for n, _ in self.sums.columns], range(len(self.sums.columns)), strict=True))
+        used = self._used(got, members)
+        h = float(used[theta["=h"]])
+        if not h > 0:
+            return np.zeros(0)
+        c, p = motion.channels, motion.plant.p
+        shift = used[theta["=moment"]] - h * used[theta["=kinematic"]]
+        for name in members:
+            effect = self.effects[name]
+            if name not in self.offered or effect.columns is None:
+                continue
+            here = used[own(self.sums, name)]
+            if effect.settled and effect.undo:
+                c = effect.undo(c, here)
+                continue
+            shift = shift + h * (effect.columns(replace(c, w2=1 / h)) @ here)
+        zmp = np.where(np.isfinite(motion.plant.p), c.zmp_x, np.nan) + shift
+        plant = replace(motion.plant, p=np.where(np.isfinite(zmp), zmp, p))
+        free = free_runs(plant, 1.0 / h)
+        miss = free - (c.com_x if not np.array_equal(c.com_x, motion.channels.com_x) else plant.x)
+        return np.asarray(miss[np.isfinite(miss)])
+
+    def contributions(self, chosen: Models, near: Sequence[str]) -> pd.DataFrame:
+        """Rows of `contributions`: models fitted to all trials."""
+        last = chosen[-1][1] if chosen else ()
+        fits = {"before": ((), self.fit(()))} | {f"after {name}": (members, self.fit(members)) for name, members in chosen}
+        beside = {n: self.fit((*(m for m in last if m != n), n)) for n in near if n in self.offered}
+        return joined("contributions", [self._shown(w, fits, beside) for w in self.windows])
+
+    def _shown(self, w: Weak, fits: Mapping[str, tuple[Sequence[str], Fit]], beside: Mapping[str, Fit]) -> pd.DataFrame:
+        about = {"trial": w.trial, "subject": w.subject, "task": w.task, "condition": w.condition, "axis": w.axis}
+        out: dict[str, Any] = {**about, "frame": w.frame, "time": w.time, "com": w.com, "velocity": w.velocity}
+        out |= {name: self.error(w, got, members) for name, (members, got) in fits.items()}
+        columns, _ = sums_design(w, self.offered, self.sums)
+        for name, got in beside.items():
+            theta = np.zeros(len(self.sums.columns))
+            theta[got.columns] = got.theta
+            mine = own(self.sums, name)
+            out[f"effect {name}"] = columns[:, mine] @ theta[mine]
+        return pd.DataFrame(out)
+
+
+def sums_design(w: Weak, offered: Sequence[str], s: Sums) -> tuple[Array, Array]:
+    """Columns and left side of the whole equation as the sums were made."""
+    return design(w, "whole", offered, s.w2, s.h)
