@@ -53,8 +53,7 @@ def of_part(
     """Table `control` of whole subjects: one row per candidate and trial left out; or one row that says why there is none.
 
     corrected: subject -> {"sync.delay": 0.016, ...}, instrument effects to take out of the CoM and the ZMP first.  plant: the same for
-    what moves the body beside the ZMP ("ang_mom.beta", "hand.k", ...): the CoM and its velocity at push end are then known better;
-    "base.w2" is the w2 fitted beside them [1/s2].
+    what moves the body beside the ZMP ("ang_mom.beta", "hand.k", ...): the CoM and its velocity at push end are then known better.
     effects: the catalogue, default the library's.  model: effects of the configured model; those of the control ledger are fitted
     together in any case.
     """

@@ -1,6 +1,6 @@
 """What laws are simulated against: a group's loci with the faults of instruments taken out and what drives the CoM accounted for."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -15,12 +15,15 @@ from plumbline.effects._channels import Channels, of_trial
 from plumbline.estimators import saturation
 from plumbline.groups import Group, of_loci
 from plumbline.models.loop import Scene
-from plumbline.plant import rows_of
+from plumbline.plant import rows_of, sampling_rate
+from plumbline.weak import Bump
 
 Array = NDArray[np.float64]
 
 FEWEST_LOCI, FEWEST_TRIALS = 4, 2
 LATE = 0.1  # [s]
+HALF_WIDTH, EXPONENT = 0.3, 4  # of the bumps that omega is fitted with again [s]
+REFITS = 2  # what an effect takes off the ZMP depends on omega
 BEND = 5.0  # [Hz] smoother of what else moves the body: L' is made of unfiltered markers
 REGIMES = {"left": -1, "inside": 0, "right": 1}
 
@@ -54,22 +57,49 @@ def staged(
     mine = loci.merge(used[["trial", "locus"]], on=["trial", "locus"])
     if len(mine) < FEWEST_LOCI or mine["trial"].nunique() < FEWEST_TRIALS:
         return f"{len(mine)} loci of {mine['trial'].nunique()} trials can be simulated; {FEWEST_LOCI} of {FEWEST_TRIALS} are needed"
-    frames = signals[signals["trial"].isin(set(mine["trial"]))]
-    omega = float(row["omega"])
-    frames = _applied(frames, coverage, known.effects, known.faults, omega, _taken_out)
+    raw = signals[signals["trial"].isin(set(mine["trial"]))]
     key = (about["subject"], about["task"], about["condition"])
-    group = next(of_loci(frames, pushes, mine, {key: omega}), None)
-    if group is None or group.steady.sum() < FEWEST_LOCI:
+
+    def groups(omega: float, shift: float = 0.0) -> Iterator[tuple[Group | None, pd.DataFrame]]:
+        """Loci and signals with the faults taken out; the same as the ZMP alone would have to drive them."""
+        frames = _applied(raw, coverage, known.effects, known.faults, omega, _taken_out)
+        for sizes in ({}, known.plant):
+            table = _applied(frames, coverage, known.effects, sizes, omega, _driven)
+            yield next(of_loci(table.assign(zmp_x=table["zmp_x"] + shift), pushes, mine, {key: omega}), None), table
+
+    omega, shift = float(row["omega"]), 0.0
+    for _ in range(REFITS):
+        (group, _), (_, driven) = groups(omega)
+        if group is None or group.steady.sum() < FEWEST_LOCI:
+            return "too few loci have an unbroken CoM and ZMP"
+        omega = _omega(driven, group, omega) if known.faults or known.plant else omega
+        shift = _constant(group.batch, omega)
+    (group, frames), (moved, _) = groups(omega, shift)
+    if group is None or moved is None:
         return "too few loci have an unbroken CoM and ZMP"
-    frames = frames.assign(zmp_x=frames["zmp_x"] + _constant(group.batch, omega))
-    group = next(of_loci(frames, pushes, mine, {key: omega}))
-    if known.plant:
-        omega = float(np.sqrt(known.plant.get("base.w2", omega**2)))
-        moved = _applied(frames, coverage, known.effects, known.plant, omega, _driven)
-        driven = next(of_loci(moved, pushes, mine, {key: omega}), None)
-        if driven is not None and driven.batch.x.shape == group.batch.x.shape:
-            group = replace(group, batch=replace(driven.batch, p=group.batch.p))
+    group = replace(group, batch=replace(moved.batch, p=group.batch.p)) if known.plant else group
     return _with_base(group, frames, trust if not known.faults else None, row, omega)
+
+
+def _omega(frames: pd.DataFrame, group: Group, before: float) -> float:
+    """Natural frequency [rad/s] that the loci of a group have once faults and other effects are taken out, a constant free in each.
+
+    The one in the table `controller` is of the signals as recorded.  before: kept where the loci cannot tell.
+    """
+    top = bottom = 0.0
+    rows = frames.groupby("trial", sort=False, observed=True).indices
+    for j, trial in enumerate(group.loci["trial"]):
+        table = rows_of(frames, rows[trial])
+        time, x, p = (table[c].to_numpy(float) for c in ("time", "com_x", "zmp_x"))
+        length = (group.batch.end[j] - group.batch.lead - 1) / group.batch.rate
+        mine = (time > group.starts[j] - 1e-9) & (time < group.starts[j] + length + 1e-9)
+        bump = Bump(HALF_WIDTH, EXPONENT, sampling_rate(time))
+        pull, lever = bump.apply(bump.curvature, x[mine]), bump.apply(bump.value, (x - p)[mine])
+        good = np.isfinite(pull + lever)
+        if good.any():
+            pull, lever = (one[good] - one[good].mean() for one in (pull, lever))
+            top, bottom = top + float(pull @ lever), bottom + float(lever @ lever)
+    return float(np.sqrt(top / bottom)) if top > 0 and bottom > 0 else before
 
 
 def _constant(batch: Batch, omega: float) -> float:
@@ -85,7 +115,7 @@ def _constant(batch: Batch, omega: float) -> float:
 
 
 class Known(NamedTuple):
-    """What the plant ledger has found, "effect.parameter" -> value: faults of instruments, and what drives the CoM beside the ZMP; the catalogue."""
+    """What the plant ledger has found, "effect.parameter" -> value: faults of instruments, and what drives the CoM beside the ZMP."""
 
     faults: dict[str, float]
     plant: dict[str, float]
