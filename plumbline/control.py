@@ -167,8 +167,8 @@ def _ledger(stage: Stage, known: Mapping[str, Effect], model: tuple[str, ...]) -
     scene = stage.scene
     first = simulate(stage.base[:, None, None], scene)
     law = loop_error.fit(PLAIN, stage.base, scene, loop_error.joint(first, scene))
-    frame = loop_error.criterion(simulate(law.theta[:, None, None], scene, closed=False), scene)
-    frame = frame or loop_error.criterion(simulate(stage.base[:, None, None], scene, closed=False), scene)
+    by_frame = (loop_error.criterion(simulate(t[:, None, None], scene, closed=False), scene) for t in (law.theta, stage.base))
+    frame = next((c for c in by_frame if c is not None), None)
     made = _criterion(law, scene) or frame  # where the simulated law runs away the frames still count
     if made is None or frame is None:
         yield _blank() | {"reason": "too few frames inside the limits of the ZMP"}

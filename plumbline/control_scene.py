@@ -21,6 +21,7 @@ from plumbline.weak import Bump
 Array = NDArray[np.float64]
 
 FEWEST_LOCI, FEWEST_TRIALS = 4, 2
+LEAST_INSIDE = 0.2  # share of frames between the limits below which the regimes are not believed
 LATE = 0.1  # [s]
 HALF_WIDTH, EXPONENT = 0.3, 4  # of the bumps that omega is fitted with again [s]
 REFITS = 2  # what an effect takes off the ZMP depends on omega
@@ -173,9 +174,13 @@ def _with_base(group: Group, frames: pd.DataFrame, trust: pd.DataFrame | None, r
         if found is None:
             return "the gains cannot be told from these loci"
         regime = found.regime
+    limits = laws.limits(group.batch, regime)
+    inside = group.batch.inside & steady
+    if np.mean(regime[inside] == 0) < LEAST_INSIDE:  # a ZMP that is held was taken for one at its limit
+        regime = np.zeros_like(regime)
+        limits = limits._replace(left=float(group.batch.p[inside].min()), right=float(group.batch.p[inside].max()))
     batch, thin = laws.thinned(group.batch.take(steady), regime[:, steady])
     batch = replace(batch, p=_impulse(group.batch.take(steady), batch))
-    limits = laws.limits(group.batch, regime)
     start = saturation.fit(group.batch.take(steady))
     if start is not None and np.isfinite(start.law.d):
         base = np.array([start.law.d, start.law.k1, start.law.k2])

@@ -19,8 +19,9 @@ Array = NDArray[np.float64]
 
 COUNTS = 8.0  # log likelihood on trials left out that an effect must gain
 MATTERS = 0.015  # share that it must take off the score, and off the geometric mean of the errors of CoM and ZMP
+FALLS = 0.05  # share that it must take off the error of the simulated CoM
 TIE = 20.0  # log likelihood within which two effects cannot be told apart, or
-TIE_SHARE = 0.03  # of what the better one gains: no law is right to more than that
+TIE_SHARE = 0.05  # of what the better one gains: no law is right to more than that
 SPREAD = 2.0  # variance of twice the log likelihood gained over that of the textbook: blocks of noise are not quite independent
 LEVEL = 0.01  # false discoveries among those named
 
@@ -172,7 +173,7 @@ def _matters(sums: _Sums, found: str, after: str) -> bool:
     if sums.refused(after):
         return False
     if sums.mode == "loop":
-        return sums.misfit(after) < (1 - MATTERS) * sums.misfit(found)
+        return sums.misfit(after) < (1 - MATTERS) * sums.misfit(found) and sums.error(after) < (1 - FALLS) * sums.error(found)
     beside = [(n, _joined(n, after)) for n in sums.names if n and after not in n.split("+")]
     return all((sums.score(a) - sums.score(b)).sum() > 2 * COUNTS for a, b in beside if b in sums.names)
 

@@ -69,35 +69,45 @@ class Now:
     """
 
     def __init__(self, scene: "Scene", k: int) -> None:
-        x, v = (np.repeat(one[:, None], k, axis=1) for one in (scene.batch.x, scene.batch.v))
-        self.past_x, self.past_v = x, v
-        self.step, self.begun, self.lead = 1 / scene.batch.rate, scene.begun, scene.batch.lead
+        batch = scene.batch
+        self.step, self.begun, self.lead = 1 / batch.rate, scene.begun, batch.lead
         self.limits, self.area = scene.limits, scene.area
-        self.row, self.swept = self.lead, np.zeros(x.shape[1:])
-        self.x, self.v = x[self.lead], v[self.lead]
+        self.past_x, self.past_v = (np.empty((len(batch.x), k, batch.x.shape[1])) for _ in "xv")
+        for past, measured in ((self.past_x, batch.x), (self.past_v, batch.v)):
+            past[: self.lead + 1] = measured[: self.lead + 1, None]
+        self.row, self._swept = self.lead, (self.lead, np.zeros(self.past_x.shape[1:]))
+        self.x, self.v = self.past_x[self.lead], self.past_v[self.lead]
         self.seen, self.far, self.kept = (self.x, self.v), self.x, self.x
-        self.which = np.arange(x.shape[1])[:, None], np.arange(x.shape[2])[None]
+        self.which = np.arange(k)[:, None], np.arange(batch.x.shape[1])[None]
 
     def at(self, row: int, x: Array, v: Array) -> None:
         """Go to a frame where the CoM is at x with v."""
-        if row > self.lead:
-            self.swept = self.swept + self.step * (self.x + x) / 2
-        self.row, self.x, self.v = row, x, v
-        self.past_x[row], self.past_v[row] = x, v
+        self.row, self.past_x[row], self.past_v[row] = row, x, v
+        self.x, self.v = self.past_x[row], self.past_v[row]
 
     @property
     def time(self) -> Array:
         """Time since the record began [s], (m,)."""
         return np.asarray(self.begun + (self.row - self.lead) * self.step)
 
+    @property
+    def swept(self) -> Array:
+        """Integral of x since the locus began [m s], (k, m)."""
+        row, area = self._swept
+        for i in range(row, self.row):
+            area = area + self.step / 2 * (self.past_x[i] + self.past_x[i + 1])
+        self._swept = max(row, self.row), area
+        return area
+
     def past(self, age: Array) -> tuple[Array, Array]:
         """x [m] and x' [m/s] as they were `age` ago [s], (k, m) or (k, 1); straight between frames."""
         at = np.maximum(self.row - age / self.step, 0.0)
         low = np.minimum(at.astype(np.int64), self.row - 1)
         part = at - low
-        i, j = self.which
-        out = [a[low, i, j] * (1 - part) + a[low + 1, i, j] * part for a in (self.past_x, self.past_v)]
-        return out[0], out[1]
+        where = (self.which[0][:, 0],) if low.shape[1] == 1 else self.which
+        one = low[:, 0] if low.shape[1] == 1 else low
+        x, v = (a[(one, *where)] * (1 - part) + a[(one + 1, *where)] * part for a in (self.past_x, self.past_v))
+        return x, v
 
 
 @dataclass(frozen=True)
@@ -127,35 +137,32 @@ def simulate(points: Array, scene: Scene, terms: Sequence[tuple[Term, int]] = ()
     closed: False to leave the CoM as measured: law against measured ZMP frame by frame.
     The plant is integrated exactly for a ZMP that is linear between frames.
     """
-    batch, omega = scene.batch, scene.omega
+    batch, t = scene.batch, scene.omega / scene.batch.rate
     (n, m), k = batch.x.shape, points.shape[1]
-    now = Now(scene, k)
-    law = _Law(points, scene, terms, k, closed)
+    now, law = Now(scene, k), _Law(points, scene, terms, k, closed)
     out = np.zeros((2, n, k, m))
-    dx, dv = np.zeros((k, m)), np.zeros((k, m))
-    t = omega / batch.rate
-    c, s = np.cosh(t), np.sinh(t)
-    x_v, v_x, x_p, v_p, x_r, v_r = s / omega, omega * s, c - 1, omega * s, s / t - 1, omega * (c - 1) / t
-    last: Array | None = None
-    rise = np.zeros((k, m))
+    c, s, w = np.cosh(t), np.sinh(t), scene.omega
+    rise = np.array([s / t - 1, w * (c - 1) / t])  # what a rise of dp over a step takes off dx and dx'
+    step = np.array([[c, s / w, 1 - c, -rise[0]], [w * s, c, -w * s, -rise[1]]])
+    state = np.zeros((4, k * m))  # dx, dx', dp, rise of dp
+    dx, dv, dp, up = state.reshape(4, k, m)
     law.warm(now)
-    for row in range(batch.lead, n):
-        alive = row < batch.end
-        if not alive.any():
-            break
+    for row in range(batch.lead, int(batch.end.max())):
         now.at(row, batch.x[row] + dx, batch.v[row] + dv)
-        dp = law.zmp(now) * alive
-        if last is not None:  # the step that led here took the ZMP's rise to go on; now it is known
-            miss = dp - last - rise
-            dx, dv = dx - x_r * miss * alive, dv - v_r * miss * alive
-        rise = dp - last if last is not None else np.zeros((k, m))
-        out[0, row], out[1, row], last = dx * alive, dp, dp
+        new = law.zmp(now)
+        out[0, row], out[1, row] = dx, new
         if not closed:
-            last = None
             continue
-        dx, dv = c * dx + x_v * dv - x_p * dp - x_r * rise, v_x * dx + c * dv - v_p * dp - v_r * rise
-        dx = np.minimum(np.maximum(dx, -FAR), FAR)
-    return out
+        if row > batch.lead:  # the step that led here took the ZMP's rise to go on; now it is known
+            grown = new - dp
+            miss = grown - up
+            dx -= rise[0] * miss
+            dv -= rise[1] * miss
+            out[0, row], up[:] = dx, grown
+        dp[:] = new
+        state[:2] = step @ state
+        np.minimum(np.maximum(dx, -FAR, out=dx), FAR, out=dx)
+    return out * batch.inside[:, None]
 
 
 class _Law:
@@ -209,8 +216,9 @@ class _Law:
         for i in self.at["out"]:
             given, p = p, self._call(i, now, p)
             self.kept[i] = np.where(p == given, measured, p)
-        both = ((asked >= right) & (regime > 0)) | ((asked <= left) & (regime < 0))
-        dp = np.where(both, 0.0, p - measured)
+        dp = p - measured
+        if regime.any():
+            dp[((asked >= right) & (regime > 0)) | ((asked <= left) & (regime < 0))] = 0.0
         for i in self.at["out"] if self.closed else ():
             self.kept[i] = measured + dp
         return np.asarray(dp)
