@@ -16,6 +16,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from plumbline.control_scene import Known, Stage, staged
+from plumbline.control_shapes import offered
 from plumbline.effects import Effect, catalogue
 from plumbline.estimators import loop_error
 from plumbline.estimators.clustered import jackknife, reach
@@ -173,10 +174,12 @@ def _ledger(stage: Stage, known: Mapping[str, Effect], model: tuple[str, ...]) -
     if made is None or frame is None:
         yield _blank() | {"reason": "too few frames inside the limits of the ZMP"}
         return
+    shapes = offered(law.theta, scene, frame)
+    known = {**known, **shapes}
     framewise = tuple(n for n, e in known.items() if any(t.framewise for t in e.law))
     search = _Search(stage, known, made, law.theta, {})
     fits, gains = _singles(search, tuple(n for n in known if n not in framewise))
-    partners = [n for n in sorted(gains, key=lambda n: -gains[n]) if gains[n] > HELPS][:PARTNERS]
+    partners = [n for n in sorted(gains, key=lambda n: -gains[n]) if gains[n] > HELPS and n not in shapes][:PARTNERS]
     best = next((_settled(f) for f in fits for n in partners[:1] if f.candidate.effects == (n,)), {})
     alone, rows = _framewise(_Search(stage, known, frame, law.theta, {}, closed=False), framewise, best)
     yield from rows
@@ -184,7 +187,8 @@ def _ledger(stage: Stage, known: Mapping[str, Effect], model: tuple[str, ...]) -
         search = _Search(stage, known, _criterion(alone, scene, EARLY) or made, alone.theta[:3], _settled(alone))
         fits = [fits[0], *[f for f in [search.best(())] if f is not None]]
     else:
-        fits += _several(search, fits, [{n, b} for n in partners for b in gains if b != n], model)
+        pairs = [{n, b} for n in partners for b in gains if b != n and (n == partners[0] or b not in shapes)]
+        fits += _several(search, fits, pairs, model)
     for f in fits:
         yield from search.rows(f)
 

@@ -13,12 +13,14 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
+from plumbline.control_shapes import SHAPES
 from plumbline.effects import Effect, catalogue
 
 Array = NDArray[np.float64]
 
 COUNTS = 8.0  # log likelihood on trials left out that an effect must gain
 MATTERS = 0.015  # share that it must take off the score, and off the geometric mean of the errors of CoM and ZMP
+SHAPED = 25.0  # log likelihood that a shape without a cause must gain
 FALLS = 0.05  # share that it must take off the error of the simulated CoM
 TIE = 20.0  # log likelihood within which two effects cannot be told apart, or
 TIE_SHARE = 0.05  # of what the better one gains: no law is right to more than that
@@ -31,7 +33,7 @@ def judge(table: pd.DataFrame, model: Sequence[str] = (), effects: Mapping[str, 
 
     model: effects of the configured model.  effects: the catalogue, default the library's.
     """
-    known = effects if effects is not None else catalogue()
+    known = {**SHAPES, **(effects if effects is not None else catalogue())}
     rows = table[table["reason"] == ""]
     if rows.empty:
         said = sorted(set(table["reason"]))
@@ -41,7 +43,11 @@ def judge(table: pd.DataFrame, model: Sequence[str] = (), effects: Mapping[str, 
     frame = _Sums(rows[rows["mode"] == "frame"])
     at_once = _step(frame, "", known, {})
     twins: dict[str, float] = {}  # effect -> log likelihood that it must gain beside what it is confounded with
+    left: _Step | None = None
     while step := at_once or _step(sums, found, known, twins):
+        if step.effect in SHAPES:
+            left = step
+            break
         after = _joined(found, step.effect)
         missing.append({
             "effect": step.effect, "family": step.family, "in_model": step.effect in model, "error_before_mm": sums.error(found),
@@ -58,8 +64,8 @@ def judge(table: pd.DataFrame, model: Sequence[str] = (), effects: Mapping[str, 
     wanted = "+".join(sorted(set(model) & {n for n, e in known.items() if e.ledger == "control"}))
     return {
         "base_error_mm": sums.error(""), "model_error_mm": sums.error(wanted), "final_error_mm": sums.error(found),
-        "noise_floor_mm": sums.error(found, "fitted_square_sum"), "missing": missing, "unexplained": False, "description": "",
-        "reason": _reason(missing, sums, found),
+        "noise_floor_mm": sums.error(found, "fitted_square_sum"), "missing": missing, "unexplained": left is not None,
+        "description": _described(left, sums, found, known) if left else "", "reason": _reason(missing, sums, found),
     }  # fmt: skip
 
 
@@ -67,6 +73,18 @@ def _unjudged(reason: str) -> dict[str, Any]:
     """The block where nothing can be said."""
     errors: dict[str, Any] = dict.fromkeys(("base_error_mm", "model_error_mm", "final_error_mm", "noise_floor_mm"))
     return errors | {"missing": None, "unexplained": False, "description": "", "reason": reason}
+
+
+def _described(left: "_Step", sums: "_Sums", found: str, known: Mapping[str, Effect]) -> str:
+    """What the shapes say that fit best, in words."""
+    said = []
+    for name in left.family[:2]:
+        sizes = sums.parameters(_joined(found, name)).get(name, {})
+        values = ", ".join(f"{k} = {v['value']:.3g} {v['unit']}" for k, v in sizes.items())
+        said.append(f"{known[name].title} (p gets {known[name].equation}, {values})")
+    share = 100 * (1 - sums.error(_joined(found, left.effect)) / sums.error(found))
+    shapes = "; or ".join(said)
+    return f"in the control residual something like: {shapes}; {share:.0f} % off the error of the CoM; no listed effect explains it"
 
 
 def _joined(found: str, name: str) -> str:
@@ -154,14 +172,15 @@ def _step(sums: _Sums, found: str, known: Mapping[str, Effect], twins: Mapping[s
         if len(more) == 1 and have < set(name.split("+")) and (sums.mode == "loop" or _framewise(known[min(more)])):
             gains[more.pop()] = float((now - sums.score(name)).sum() / 2)
     q = _q_values({n: _p_value(g, sums.sizes(_joined(found, n)) - sums.sizes(found)) for n, g in gains.items()})
-    least = {n: max(COUNTS, twins.get(n, 0.0), MATTERS * now.sum() / 2) for n in gains}
+    least = {n: max(COUNTS, twins.get(n, 0.0), MATTERS * now.sum() / 2, SHAPED if n in SHAPES else 0.0) for n in gains}
     good = {n: g for n, g in gains.items() if g > least[n] and q[n] < LEVEL and _matters(sums, found, _joined(found, n))}
     if not good:
         return None
-    best = max(good, key=lambda n: good[n] + max(t.odds for t in known[n].law))
     most = max(good.values())
-    like = sorted((n for n in good if n != best and good[n] > most - max(TIE, TIE_SHARE * most)), key=lambda n: -good[n])
-    return _Step(best, [best, *like], good[best], q[best])
+    tie = max(TIE, TIE_SHARE * most)
+    best = max(good, key=lambda n: good[n] + (-tie if n in SHAPES else max(t.odds for t in known[n].law)))
+    like = [n for n in good if n != best and good[n] > most - tie and (n in SHAPES) == (best in SHAPES)]
+    return _Step(best, [best, *sorted(like, key=lambda n: -good[n])], good[best], q[best])
 
 
 def _framewise(effect: Effect) -> bool:
