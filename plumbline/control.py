@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from plumbline.control_scene import Known, Stage, staged
+from plumbline.control_scene import FEWEST_LOCI, Known, Stage, staged
 from plumbline.control_shapes import offered
 from plumbline.effects import Effect, catalogue
 from plumbline.estimators import loop_error
@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 
 TASK = "lateral"
 FOLDS = 8
+AWAY, NEVER_AWAY = 8.0, 0.02  # times the median rms of the loci, and [m], from which the simulated CoM has left a locus
 HELPS = 4.0  # log likelihood on trials left out from which on an effect is tried in pairs
 PARTNERS = 2  # effects that are tried in pairs with all others
 ACCEPTED = 10.0  # log likelihood on trials left out from which on a framewise effect stands in every simulated law
@@ -168,6 +169,11 @@ def _ledger(stage: Stage, known: Mapping[str, Effect], model: tuple[str, ...]) -
     scene = stage.scene
     first = simulate(stage.base[:, None, None], scene)
     law = loop_error.fit(PLAIN, stage.base, scene, loop_error.joint(first, scene))
+    stays = _stays(simulate(law.theta[:, None, None], scene), scene)
+    if not stays.all():
+        stage = stage.take(stays)
+        scene = stage.scene
+        law = loop_error.fit(PLAIN, law.theta, scene, loop_error.joint(simulate(law.theta[:, None, None], scene), scene))
     by_frame = (loop_error.criterion(simulate(t[:, None, None], scene, closed=False), scene) for t in (law.theta, stage.base))
     frame = next((c for c in by_frame if c is not None), None)
     made = _criterion(law, scene) or frame  # where the simulated law runs away the frames still count
@@ -191,6 +197,13 @@ def _ledger(stage: Stage, known: Mapping[str, Effect], model: tuple[str, ...]) -
         fits += _several(search, fits, pairs, model)
     for f in fits:
         yield from search.rows(f)
+
+
+def _stays(outputs: Array, scene: Scene) -> NDArray[np.bool_]:
+    """Loci (m,) that a law follows, outputs (2, n, 1, m): near a fall the smallest push of noise decides, and one such locus all."""
+    rms = np.sqrt(np.sum(outputs[0][:, 0] ** 2, axis=0) / scene.batch.inside.sum(0))
+    stays = rms < max(AWAY * float(np.median(rms)), NEVER_AWAY)
+    return np.asarray(stays if stays.sum() >= FEWEST_LOCI else np.ones_like(stays))
 
 
 def _singles(search: _Search, names: tuple[str, ...]) -> tuple[list[Fit], dict[str, float]]:

@@ -38,6 +38,10 @@ class Stage(NamedTuple):
     late: Array
     trials: tuple[str, ...]
 
+    def take(self, loci: NDArray[np.bool_]) -> "Stage":
+        """Some of the loci."""
+        return self._replace(scene=self.scene.take(loci), trials=tuple(t for t, kept in zip(self.trials, loci, strict=True) if kept))
+
 
 def staged(
     about: Mapping[str, str],
