@@ -8,7 +8,7 @@ the plant ledger are taken out before: a force record 16 ms late looks like a re
 import itertools
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -33,6 +33,7 @@ HELPS = 4.0  # log likelihood on trials left out from which on an effect is trie
 PARTNERS = 2  # effects that are tried in pairs with all others
 ACCEPTED = 10.0  # log likelihood on trials left out from which on a framewise effect stands in every simulated law
 EARLY = 0.8  # [s] from a locus' start that counts then: later noise and zone decide together where the person drifts
+AGAIN = 8  # rounds of a fit begun from one of a part of it, or of the same under another criterion
 ROUGH = 6  # rounds of framewise fits: their sizes have next to no slope
 NEAR = (0.7, 1.4)  # of a framewise effect's size, within which it may move in the simulated law
 AROUND = (0.75, 0.85, 0.92, 1.0, 1.08, 1.17, 1.3)  # of a size that has no slope, to begin the last search from
@@ -128,13 +129,15 @@ class _Search:
     base: Array
     given: Settled
     closed: bool = True
+    done: dict[int, tuple[Fit, tuple[Array, ...]]] = field(default_factory=dict)
 
     def best(self, names: tuple[str, ...], settled: Settled | None = None) -> Fit | None:
         """The best variant of a set of effects beside those given."""
         names = tuple(sorted({*names, *self.given}))
         tried = candidates(self.known, names, {**(settled or {}), **self.given}, closed=self.closed)
         bases = np.array([self.base, self.stage.late] if names and not settled else [self.base])
-        fits = [loop_error.fit(c, bases, self.stage.scene, self.whiten, ROUGH if not self.closed else loop_error.ROUNDS) for c in tried]
+        rounds = ROUGH if not self.closed else AGAIN if settled else loop_error.ROUNDS
+        fits = [loop_error.fit(c, bases, self.stage.scene, self.whiten, rounds) for c in tried]
         return min(fits, key=_cost) if fits else None
 
     def beside(self, names: tuple[str, ...], fits: Sequence[Fit]) -> Fit | None:
@@ -146,18 +149,25 @@ class _Search:
     def again(self, old: Fit) -> Fit:
         """A fit begun from where it ended under another criterion."""
         near = replace(old.candidate, starts=old.theta[None, 3:])
-        return loop_error.fit(near, old.theta[:3], self.stage.scene, self.whiten)
+        return loop_error.fit(near, old.theta[:3], self.stage.scene, self.whiten, AGAIN)
 
-    def score(self, got: Fit) -> tuple[Array, Array, Array]:
-        """Sums of squares of each locus with the parameters of the other trials."""
-        scene = self.stage.scene
-        theta = loop_error.left_out(got, _folds(self.stage.trials), scene, self.whiten)
-        return loop_error.judged(theta, got.candidate, scene, self.whiten)
+    def sums(self, got: Fit) -> tuple[Array, ...]:
+        """Of each locus with the parameters of the other trials: the first four sums of squares of the table."""
+        if id(got) not in self.done:
+            scene = self.stage.scene
+            left_out = loop_error.left_out(got, _folds(self.stage.trials), scene, self.whiten)
+            theta = np.stack([left_out, np.repeat(got.theta[:, None], left_out.shape[1], axis=1)], axis=1)
+            dx, dp, e = loop_error.judged(theta, got.candidate, scene, self.whiten)
+            self.done[id(got)] = got, (dx[0], dp[0], e[0], dx[1])
+        return self.done[id(got)][1]
+
+    def score(self, got: Fit) -> Array:
+        """The criterion of each locus with the parameters of the other trials."""
+        return self.sums(got)[2]
 
     def rows(self, got: Fit) -> Iterator[dict[str, Any]]:
         """Rows of `control` of a candidate."""
-        whole = loop_error.judged(np.tile(got.theta[:, None], len(self.stage.trials)), got.candidate, self.stage.scene, self.whiten)[0]
-        yield from _rows(got, (*self.score(got), whole), self.stage, self.known)
+        yield from _rows(got, self.sums(got), self.stage, self.known)
 
 
 def _cost(got: Fit) -> float:
@@ -211,8 +221,8 @@ def _singles(search: _Search, names: tuple[str, ...]) -> tuple[list[Fit], dict[s
     fits = [f for f in [search.best(()), *[search.best((n,)) for n in names]] if f is not None]
     search.whiten = _criterion(min(fits, key=_cost), search.stage.scene) or search.whiten
     fits = [search.again(f) for f in fits]
-    base, trials = search.score(fits[0])[2], search.stage.trials
-    return fits, {f.candidate.effects[0]: loop_error.gain(base, search.score(f)[2], trials)[0] for f in fits[1:]}
+    base, trials = search.score(fits[0]), search.stage.trials
+    return fits, {f.candidate.effects[0]: loop_error.gain(base, search.score(f), trials)[0] for f in fits[1:]}
 
 
 def _several(search: _Search, fits: Sequence[Fit], pairs: Sequence[set[str]], model: tuple[str, ...]) -> list[Fit]:
@@ -233,18 +243,19 @@ def _framewise(search: _Search, names: tuple[str, ...], best: Settled) -> tuple[
     found: dict[str, Fit] = {}
     for beside in [{}, best] if best else [{}]:
         there = tuple(sorted(beside))
-        plain = search.best(there, beside)
+        tried = [n for n in names if gains.get(n, np.inf) > ACCEPTED]
+        plain = search.best(there, beside) if tried else None
         if plain is None:
             continue
-        base = search.score(plain)[2]
+        base = search.score(plain)
         rows += search.rows(plain)
-        for name in names:
+        for name in tried:
             got = search.best(tuple(sorted((*there, name))), beside)
             if got is None:
                 continue
-            got = _refined(search, got, name)
+            got = _refined(search, got, name) if _cost(plain) - _cost(got) > ACCEPTED else got
             rows += search.rows(got)
-            gain = loop_error.gain(base, search.score(got)[2], search.stage.trials)[0]
+            gain = loop_error.gain(base, search.score(got), search.stage.trials)[0]
             gains[name] = min(gain, gains.get(name, np.inf))
             found.setdefault(name, got)
     most = max(gains, key=lambda n: gains[n], default="")
@@ -270,7 +281,7 @@ def _folds(trials: Sequence[str]) -> NDArray[np.int64]:
     return np.unique(trials, return_inverse=True)[1] % FOLDS
 
 
-def _rows(got: Fit, sums: tuple[Array, Array, Array, Array], stage: Stage, known: Mapping[str, Effect]) -> Iterator[dict[str, Any]]:
+def _rows(got: Fit, sums: tuple[Array, ...], stage: Stage, known: Mapping[str, Effect]) -> Iterator[dict[str, Any]]:
     """One row per trial of a candidate; sums: of each locus, the first four of the table's."""
     trials = np.asarray(stage.trials)
     frames = stage.scene.batch.inside.sum(0)

@@ -9,7 +9,7 @@ from plumbline.estimators.loop_error import Criterion
 from plumbline.models.loop import Array, Now, Scene, Sizes, Term, simulate
 
 FREQUENCIES = np.arange(0.15, 1.6, 0.02)  # [Hz] of a rhythm
-HINT = 10.0  # log likelihood that a rhythm must gain frame by frame to be tried in the loop
+HINT = 10.0  # log likelihood that a shape must gain frame by frame to be tried in the loop
 
 
 def _kink(far: Array, now: Now, sizes: Sizes) -> Array:
@@ -17,7 +17,7 @@ def _kink(far: Array, now: Now, sizes: Sizes) -> Array:
 
 
 def _bend(far: Array, now: Now, sizes: Sizes) -> Array:
-    return np.asarray(far + sizes[0] * far**3)
+    return np.asarray(far + sizes[0] * far * far * far)
 
 
 def _speed_kink(now: Now, sizes: Sizes) -> Array:
@@ -25,7 +25,7 @@ def _speed_kink(now: Now, sizes: Sizes) -> Array:
 
 
 def _speed_bend(now: Now, sizes: Sizes) -> Array:
-    return np.asarray(sizes[0] * now.seen[1] ** 3)
+    return np.asarray(sizes[0] * now.seen[1] * now.seen[1] * now.seen[1])
 
 
 def _rhythm(now: Now, sizes: Sizes) -> Array:
@@ -64,27 +64,31 @@ SHAPES = {
 
 
 def offered(theta: Array, scene: Scene, whiten: Criterion) -> dict[str, Effect]:
-    """The shapes worth a fit: a rhythm only where frame by frame a frequency stands out, begun from there.
+    """The shapes that stand out frame by frame, beside a constant, x and x'; the rhythm begins at its best frequency.
 
     theta: d, k1, k2 of the law whose ZMP leaves what is searched; whiten: frees it of its colour.
     """
-    out = dict(SHAPES)
-    turn = (
-        2
-        * np.pi
-        * FREQUENCIES[:, None]
-        * (scene.begun + (np.arange(len(scene.batch.x))[:, None, None] - scene.batch.lead) / scene.batch.rate)
-    )
-    error, sine, cosine = (
-        whiten(np.stack([y, y])) for y in (simulate(theta[:, None, None], scene, closed=False)[1], np.sin(turn), np.cos(turn))
-    )
-    ss, sc, cc = (np.sum(a * b, axis=(0, 2)) for a, b in ((sine, sine), (sine, cosine), (cosine, cosine)))
-    es, ec = (np.sum(error * a, axis=(0, 2)) for a in (sine, cosine))
-    gained = (cc * es**2 - 2 * sc * es * ec + ss * ec**2) / np.maximum(ss * cc - sc**2, 1e-12) / 2
-    best = int(np.argmax(gained))
-    if gained[best] < HINT:
-        del out["~rhythm"]
-        return out
-    rhythm = out["~rhythm"]
-    out["~rhythm"] = replace(rhythm, law=(replace(rhythm.law[0], starts=((0.0, 0.0, float(FREQUENCIES[best])),)),))
+    far, v = scene.batch.x - theta[0], scene.batch.v
+    time = scene.begun + (np.arange(len(far))[:, None] - scene.batch.lead) / scene.batch.rate
+    turn = 2 * np.pi * FREQUENCIES[:, None] * time[:, None]
+
+    def columns(*each: Array) -> Array:
+        """Whitened columns (blocks of all loci, k) from (n, m) or (n, k, m)."""
+        stacked = np.concatenate([one if one.ndim == 3 else one[:, None] for one in each], axis=1)
+        out = whiten(np.stack([stacked, stacked]))
+        return out.transpose(0, 2, 1).reshape(-1, out.shape[1])
+
+    plain = np.linalg.qr(columns(np.ones_like(far), far, v))[0]
+    error = columns(simulate(theta[:, None, None], scene, closed=False)[1])[:, 0]
+    given = columns(np.abs(far), far * far * far, np.abs(v), v * v * v, np.sin(turn), np.cos(turn))
+    error, given = error - plain @ (plain.T @ error), given - plain @ (plain.T @ given)
+    alone, (sine, cosine) = given[:, :4], np.split(given[:, 4:], 2, axis=1)
+    gained = (error @ alone) ** 2 / np.maximum((alone**2).sum(0), 1e-12) / 2
+    out = {name: SHAPES[name] for name, gain in zip(("~kink", "~bend", "~speed_kink", "~speed_bend"), gained, strict=True) if gain > HINT}
+    ss, sc, cc, es, ec = (sine**2).sum(0), (sine * cosine).sum(0), (cosine**2).sum(0), error @ sine, error @ cosine
+    waves = (cc * es**2 - 2 * sc * es * ec + ss * ec**2) / np.maximum(ss * cc - sc**2, 1e-12) / 2
+    best = int(np.argmax(waves))
+    if waves[best] > HINT:
+        rhythm = SHAPES["~rhythm"]
+        out["~rhythm"] = replace(rhythm, law=(replace(rhythm.law[0], starts=((0.0, 0.0, float(FREQUENCIES[best])),)),))
     return out

@@ -26,7 +26,7 @@ Whiten = Callable[[Array], Array]
 BLOCK = 0.08  # [s]
 ORDER = 2  # of the noise's own colour
 MARGIN = 2.5  # sd of the feedback noise that the law must stay away from a limit
-ROUNDS = 20
+ROUNDS = 14
 PATIENCE, BEHIND = 3, 1.3  # rounds after which a start that costs so much more than the best is given up
 SETTLED = 1e-4  # share of the cost that a full step promises, below which the search has settled
 BOUNDS = ((-0.3, 0.3), (1.01, 20.0), (0.0, 8.0))  # of d [m], k1 [1], k2 [s]
@@ -243,10 +243,10 @@ def left_out(got: Fit, fold: NDArray[np.int64], scene: Scene, whiten: Whiten) ->
 
 
 def judged(theta: Array, candidate: Candidate, scene: Scene, whiten: Whiten) -> tuple[Array, Array, Array]:
-    """Of each locus with its own parameters (q, m): sum of squares of dx [m2], of dp [m2], and of e [1], each (m,)."""
-    outputs = candidate.simulate(theta[:, None], scene)
-    dx, dp = (np.sum(one[:, 0] ** 2, axis=0) for one in outputs)
-    return dx, dp, np.sum(whiten(outputs) ** 2, axis=(0, 1))
+    """Of k laws on each locus, (q, k, m): sum of squares of dx [m2], of dp [m2], and of e [1], each (k, m)."""
+    outputs = candidate.simulate(theta, scene)
+    dx, dp = np.sum(outputs**2, axis=1)
+    return dx, dp, np.sum(whiten(outputs) ** 2, axis=0)
 
 
 def gain(base: Array, other: Array, groups: Sequence[str]) -> tuple[float, float]:
