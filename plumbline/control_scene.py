@@ -178,11 +178,13 @@ def _with_base(group: Group, frames: pd.DataFrame, trust: pd.DataFrame | None, r
         if found is None:
             return "the gains cannot be told from these loci"
         regime = found.regime
-    limits = laws.limits(group.batch, regime)
     inside = group.batch.inside & steady
+    ends = laws.limits(group.batch, regime)
+    reached = float(group.batch.p[inside].min()), float(group.batch.p[inside].max())
     if np.mean(regime[inside] == 0) < LEAST_INSIDE:  # a ZMP that is held was taken for one at its limit
-        regime = np.zeros_like(regime)
-        limits = limits._replace(left=float(group.batch.p[inside].min()), right=float(group.batch.p[inside].max()))
+        regime, ends = np.zeros_like(regime), ends._replace(left=-np.inf, right=np.inf)
+    # a limit at which no regime was found may have been touched: the ZMP was never seen beyond
+    limits = tuple(e if np.isfinite(e) else r for e, r in zip((ends.left, ends.right), reached, strict=True))
     batch, thin = laws.thinned(group.batch.take(steady), regime[:, steady])
     batch = replace(batch, p=_impulse(group.batch.take(steady), batch))
     start = saturation.fit(group.batch.take(steady))
@@ -191,7 +193,7 @@ def _with_base(group: Group, frames: pd.DataFrame, trust: pd.DataFrame | None, r
     else:
         base = row[["reference", "k1", "k2"]].to_numpy(float)
     begun, area = _begun(group, frames)
-    scene = Scene(batch, thin, omega, (limits.left, limits.right), begun[steady], area[steady])
+    scene = Scene(batch, thin, omega, (limits[0], limits[1]), begun[steady], area[steady])
     return Stage(scene, base, _late(scene, base), tuple(group.loci["trial"][steady].astype(str)))
 
 

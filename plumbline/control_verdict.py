@@ -28,22 +28,45 @@ SPREAD = 2.0  # variance of twice the log likelihood gained over that of the tex
 LEVEL = 0.01  # false discoveries among those named
 
 
-def judge(table: pd.DataFrame, model: Sequence[str] = (), effects: Mapping[str, Effect] | None = None) -> dict[str, Any]:
+def judge(
+    table: pd.DataFrame, model: Sequence[str] = (), effects: Mapping[str, Effect] | None = None, *, settled: bool = True
+) -> dict[str, Any]:
     """The block `control` of `verdict.json` from rows of the table `control`: all subjects, or those of one.
 
-    model: effects of the configured model.  effects: the catalogue, default the library's.
+    model: effects of the configured model.  effects: the catalogue, default the library's.  settled: False where the plant ledger has
+    something left that no effect explains: a force from outside would pass for a late law, so that nothing is named then.
     """
     known = {**SHAPES, **(effects if effects is not None else catalogue())}
     rows = table[table["reason"] == ""]
     if rows.empty:
         said = sorted(set(table["reason"]))
         return _unjudged(said[0] if said else "no task `lateral` with loci: the controller is judged on returns from pushes there")
-    sums, found = _Sums(rows[rows["mode"] == "loop"]), ""
+    sums = _Sums(rows[rows["mode"] == "loop"])
+    missing, found, left = _missing(sums, _Sums(rows[rows["mode"] == "frame"]), known, model)
+    best = _joined(found, left.effect) if left else found
+    wanted = "+".join(sorted(set(model) & {n for n, e in known.items() if e.ledger == "control"}))
+    block = {
+        "base_error_mm": sums.error(""), "model_error_mm": sums.error(wanted), "final_error_mm": sums.error(found),
+        "noise_floor_mm": sums.error(best, "fitted_square_sum"), "missing": missing, "unexplained": left is not None,
+        "description": _described(left, sums, found, known) if left else "", "reason": _reason(missing, sums, found),
+    }  # fmt: skip
+    return block if settled or not (missing or left) else block | UNSETTLED
+
+
+UNSETTLED = {
+    "missing": None, "unexplained": False, "description": "",
+    "reason": "not judged: the plant equation lacks something that no effect explains, and it would pass for a fault of the law",
+}  # fmt: skip
+
+
+def _missing(
+    sums: "_Sums", frame: "_Sums", known: Mapping[str, Effect], model: Sequence[str]
+) -> tuple[list[dict[str, Any]], str, "_Step | None"]:
+    """The entries of `missing`, the candidate that has them all, and the shape that is left, if any."""
     missing: list[dict[str, Any]] = []
-    frame = _Sums(rows[rows["mode"] == "frame"])
+    found, left = "", None
     at_once = _step(frame, "", known, {})
     twins: dict[str, float] = {}  # effect -> log likelihood that it must gain beside what it is confounded with
-    left: _Step | None = None
     while step := at_once or _step(sums, found, known, twins):
         if step.effect in SHAPES:
             left = step
@@ -61,12 +84,7 @@ def judge(table: pd.DataFrame, model: Sequence[str] = (), effects: Mapping[str, 
     parameters = (frame if at_once else sums).parameters(found)
     for entry in missing:
         entry["parameters"] = parameters.get(entry["effect"], {})
-    wanted = "+".join(sorted(set(model) & {n for n, e in known.items() if e.ledger == "control"}))
-    return {
-        "base_error_mm": sums.error(""), "model_error_mm": sums.error(wanted), "final_error_mm": sums.error(found),
-        "noise_floor_mm": sums.error(found, "fitted_square_sum"), "missing": missing, "unexplained": left is not None,
-        "description": _described(left, sums, found, known) if left else "", "reason": _reason(missing, sums, found),
-    }  # fmt: skip
+    return missing, found, left
 
 
 def _unjudged(reason: str) -> dict[str, Any]:

@@ -1,5 +1,7 @@
 """The closed loop beside the measured motion, and the terms that effects put into it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from made_loci import PUBLISHED, RATE, made
@@ -70,3 +72,15 @@ def test_a_stage_that_the_loop_does_not_have_is_refused() -> None:
     """The message lists those it has."""
     with pytest.raises(ValueError, match="seen, reference, place"):
         Term("elsewhere", lambda now, sizes: sizes[0], ((0.0,),), (1.0,))
+
+
+def test_where_law_and_measurement_are_at_the_same_limit_nothing_is_simulated() -> None:
+    """A limit half a millimetre off changes no CoM while both are there; at the other limit it counts."""
+    stage = scene()
+    beyond = np.array([-0.3, 20.0, 0.0])[:, None, None]  # asks for more than the right limit wherever the CoM is
+    moved = replace(stage, limits=(-0.1, 0.0995))
+    dp = simulate(beyond, moved)[1][:, 0]
+    right = (stage.regime > 0) & stage.batch.inside
+    assert right.any()
+    assert not dp[right].any()
+    assert np.abs(dp[(stage.regime < 0) & stage.batch.inside]).min() > 0.1

@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 Sizes = Sequence[Array]
 
 STAGES = ("seen", "reference", "place", "added", "asked", "out")
-FAR = 0.5  # [m] a simulated CoM that strays further is held there
+FAR, FAST = 0.5, 2.0  # [m], [m/s] a simulated CoM that strays further or faster is held there
 
 
 @dataclass(frozen=True)
@@ -161,7 +161,7 @@ def simulate(points: Array, scene: Scene, terms: Sequence[tuple[Term, int]] = ()
             out[0, row], up[:] = dx, grown
         dp[:] = new
         state[:2] = step @ state
-        np.minimum(np.maximum(dx, -FAR, out=dx), FAR, out=dx)
+        np.clip(state[:2], [[-FAR], [-FAST]], [[FAR], [FAST]], out=state[:2])
     return out * batch.inside[:, None]
 
 
