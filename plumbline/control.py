@@ -6,7 +6,6 @@ the plant ledger are taken out before: a force record 16 ms late looks like a re
 """
 
 import itertools
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -15,11 +14,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from plumbline.control_rows import blank, of_fit
 from plumbline.control_scene import FEWEST_LOCI, Known, Stage, staged
 from plumbline.control_shapes import offered
 from plumbline.effects import Effect, catalogue
 from plumbline.estimators import loop_error
-from plumbline.estimators.clustered import jackknife, reach
 from plumbline.estimators.loop_error import Candidate, Criterion, Fit
 from plumbline.models.loop import Scene, Term, simulate
 from plumbline.tables import TABLES
@@ -71,7 +70,7 @@ def of_part(
         settled = Known(dict((corrected or {}).get(subject, {})), dict((plant or {}).get(subject, {})), every)
         found = staged(about, mine, signals, pushes, coverage, trust, clusters, controller, settled)
         if isinstance(found, str):
-            rows.append(_blank() | about | {"reason": found})
+            rows.append(blank() | about | {"reason": found})
             continue
         rows += [row | about for row in _ledger(found, known, tuple(sorted(set(model) & set(known))))]
     return pd.DataFrame(rows, columns=[c.name for c in TABLES["control"]])
@@ -167,7 +166,7 @@ class _Search:
 
     def rows(self, got: Fit) -> Iterator[dict[str, Any]]:
         """Rows of `control` of a candidate."""
-        yield from _rows(got, self.sums(got), self.stage, self.known)
+        yield from of_fit(got, self.sums(got), self.stage, self.known)
 
 
 def _cost(got: Fit) -> float:
@@ -188,7 +187,7 @@ def _ledger(stage: Stage, known: Mapping[str, Effect], model: tuple[str, ...]) -
     frame = next((c for c in by_frame if c is not None), None)
     made = _criterion(law, scene) or frame  # where the simulated law runs away the frames still count
     if made is None or frame is None:
-        yield _blank() | {"reason": "too few frames inside the limits of the ZMP"}
+        yield blank() | {"reason": "too few frames inside the limits of the ZMP"}
         return
     shapes = offered(law.theta, scene, frame)
     known = {**known, **shapes}
@@ -279,41 +278,3 @@ def _criterion(got: Fit, scene: Scene, until: float = np.inf) -> Criterion | Non
 def _folds(trials: Sequence[str]) -> NDArray[np.int64]:
     """Number of the fold in which each locus is left out: by trial, at most FOLDS."""
     return np.unique(trials, return_inverse=True)[1] % FOLDS
-
-
-def _rows(got: Fit, sums: tuple[Array, ...], stage: Stage, known: Mapping[str, Effect]) -> Iterator[dict[str, Any]]:
-    """One row per trial of a candidate; sums: of each locus, the first four of the table's."""
-    trials = np.asarray(stage.trials)
-    frames = stage.scene.batch.inside.sum(0)
-    found = _parameters(got, known)
-    refused = any(all(abs(found[n][p.name]["value"]) < p.matters for p in known[n].parameters) for n in found)
-    refused |= any(found[n][p.name]["value"] in (p.lower, p.upper) for n in found for p in known[n].parameters if p.matters)
-    about = {"candidate": "+".join(got.candidate.effects), "parameters": json.dumps(found), "refused": refused, "settled": got.settled}
-    about |= {"mode": "loop" if got.candidate.closed else "frame"}
-    about |= {"d": float(got.theta[0]), "k1": float(got.theta[1]), "k2": float(got.theta[2]), "sizes": len(got.theta) - 3}
-    names = ("square_sum", "zmp_square_sum", "score", "fitted_square_sum")
-    for trial in np.unique(trials):
-        mine = trials == trial
-        row = {"trial": str(trial), "loci": int(mine.sum()), "frames": int(frames[mine].sum())}
-        yield _blank() | about | row | {name: float(one[mine].sum()) for name, one in zip(names, sums, strict=True)}
-
-
-def _parameters(got: Fit, known: Mapping[str, Effect]) -> dict[str, dict[str, Any]]:
-    """effect -> parameter -> value, unit, 95 % interval; clustered by locus."""
-    free = np.diag(got.normals.sum(0)) > 0
-    covariance = np.full((len(got.theta),) * 2, np.nan)
-    covariance[np.ix_(free, free)] = jackknife(got.normals[:, free][:, :, free], got.scores[:, free])
-    out: dict[str, dict[str, Any]] = {}
-    at = 3
-    for name in got.candidate.effects:
-        out[name] = {}
-        for p in known[name].parameters:
-            value, half = float(got.theta[at]), float(reach(covariance[at, at], len(got.cost)))
-            ends = [max(value - half, p.lower), min(value + half, p.upper)] if np.isfinite(half) else None
-            out[name][p.name] = {"value": value, "unit": p.unit, "ci95": ends}
-            at += 1
-    return out
-
-
-def _blank() -> dict[str, Any]:
-    return {c.name: {"str": "", "int": 0, "float": float("nan"), "bool": False}[c.kind] for c in TABLES["control"]}

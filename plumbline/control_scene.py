@@ -31,12 +31,13 @@ REGIMES = {"left": -1, "inside": 0, "right": 1}
 
 class Stage(NamedTuple):
     """A group's loci that do not fall, ready to be simulated; base: d, k1, k2 to begin from, late: those of a law that acts LATE;
-    trials: of each locus."""
+    trials: of each locus; shift: time [s] by which instruments were put right."""
 
     scene: Scene
     base: Array
     late: Array
     trials: tuple[str, ...]
+    shift: float = 0.0
 
     def take(self, loci: NDArray[np.bool_]) -> "Stage":
         """Some of the loci."""
@@ -83,7 +84,14 @@ def staged(
     if group is None or moved is None:
         return "too few loci have an unbroken CoM and ZMP"
     group = replace(group, batch=replace(moved.batch, p=group.batch.p)) if known.plant else group
-    return _with_base(group, frames, trust if not known.faults else None, row, omega)
+    stage = _with_base(group, frames, trust if not known.faults else None, row, omega)
+    return stage if isinstance(stage, str) else stage._replace(shift=_shift(known))
+
+
+def _shift(known: "Known") -> float:
+    """Largest time among the faults taken out [s]."""
+    times = [f"{name}.{p.name}" for name, effect in known.effects.items() for p in effect.parameters if p.unit == "s"]
+    return max((abs(known.faults.get(time, 0.0)) for time in times), default=0.0)
 
 
 def _omega(frames: pd.DataFrame, group: Group, before: float) -> float:
