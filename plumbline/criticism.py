@@ -1,5 +1,6 @@
 """The plant of a study judged: windows with the instruments settled, subject by subject, then all subjects together."""
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -167,3 +168,28 @@ class Shelf(Mapping[str, pd.DataFrame]):
 
     def __len__(self) -> int:
         return len(self.where)
+
+
+Sizes = dict[str, dict[str, list[float]]]
+
+
+def known(judged: pd.DataFrame, tried: pd.DataFrame, effects: Mapping[str, Effect]) -> tuple[Sizes, Sizes]:
+    """What was found in each subject's lateral motion, as the control ledger takes it out: faults of records, what the body does besides.
+
+    judged, tried: tables `judged`, `candidates`.  Returns subject -> effect -> parameters where it can undo itself, else coefficients.
+    """
+    faults: Sizes = {}
+    others: Sizes = {}
+    for _, about in judged[(judged["axis"] == "lateral") & (judged["reason"] == "")].iterrows():
+        theta = json.loads(about["theta"])
+        rows = tried[(tried["axis"] == "lateral") & (tried["subject"] == about["subject"]) & (tried["status"] == "found")]
+        for _, row in rows.iterrows():
+            name, values = str(row["effect"]), {k: v["value"] for k, v in json.loads(row["parameters"]).items()}
+            if "e0" in values:  # a shift of the CoM is one of the CoP, the other way
+                faults.setdefault(about["subject"], {})["offset"] = [-values["e0"]]
+            if name not in effects or (name not in theta and name not in ("offset", "tilt")):
+                continue
+            direct = effects[name].undo is not None or name not in theta
+            sizes = [*values.values()] if direct else theta[name]
+            (faults if effects[name].recorded else others).setdefault(about["subject"], {})[name] = sizes
+    return faults, others

@@ -23,7 +23,7 @@ NOTHING = {"kind": "weak"} | dict.fromkeys(("error_mm", "ci_low_mm", "ci_high_mm
 
 
 def ladder(heldout: pd.DataFrame, rungs: pd.DataFrame, control: pd.DataFrame, effects: Mapping[str, Effect]) -> pd.DataFrame:
-    """Table `ladder`: the base rung and one per model, pooled and per task, subject and condition, weak and free-run; then the control ledger.
+    """Table `ladder`: the base rung and one per model, pooled and per task, subject and condition, weak and free-run; and of the law.
 
     heldout, rungs, control: tables of all parts. Errors are pooled as rms over test functions (frames for the free run), in mm.
     """
@@ -54,7 +54,7 @@ def control_rungs(control: pd.DataFrame, effects: Mapping[str, Effect]) -> Itera
         for entry in [None, *said["missing"]]:
             names += [entry["effect"]] if entry else []
             key = {"axis": "lateral", "task": "all", "subject": subject, "condition": "all"}
-            errors = control_verdict.errors(rows, names)
+            errors = error_mm(*control_verdict.trials(rows, names))
             yield {
                 "ledger": "control", **key, "kind": "free_run", "model": "+ " + names[-1] if names else "base", "effects": ", ".join(names),
                 **errors, "noise_floor_mm": said["noise_floor_mm"],
@@ -113,7 +113,9 @@ class Said:
     control: pd.DataFrame
 
 
-def verdict(said: Said, evaluation: Mapping[str, Any], effects: Mapping[str, Effect], models: Sequence[tuple[str, Sequence[str]]]) -> dict[str, Any]:
+def verdict(
+    said: Said, evaluation: Mapping[str, Any], effects: Mapping[str, Effect], models: Sequence[tuple[str, Sequence[str]]]
+) -> dict[str, Any]:
     """The interface `results/verdict.json`: the lateral axis pooled on top, then by axis and by subject.
 
     effects: the catalogue.  models: of the config, none for `auto`.
@@ -134,13 +136,17 @@ def _model(said: Said, axis: str, models: Sequence[tuple[str, Sequence[str]]]) -
     """Effects of the last model configured; with `auto` those found."""
     if models:
         return list(models[-1][1])
-    found = said.candidates[(said.candidates["axis"] == axis) & (said.candidates["subject"] == "all") & (said.candidates["status"] == "found")]
+    found = said.candidates[
+        (said.candidates["axis"] == axis) & (said.candidates["subject"] == "all") & (said.candidates["status"] == "found")
+    ]
     plant = [str(e) for e in found["effect"] if e]
     control = control_verdict.judge(said.control)["missing"] if axis == "lateral" else None
     return [*plant, *(m["effect"] for m in control or [])]
 
 
-def _blocks(said: Said, axis: str, subject: str, effects: Mapping[str, Effect], models: Sequence[tuple[str, Sequence[str]]]) -> dict[str, Any]:
+def _blocks(
+    said: Said, axis: str, subject: str, effects: Mapping[str, Effect], models: Sequence[tuple[str, Sequence[str]]]
+) -> dict[str, Any]:
     model = _model(said, axis, models)
     return {"plant": _plant(said, axis, subject, effects, model), "control": _control(said, axis, subject, effects, model)}
 
@@ -155,7 +161,7 @@ def _plant(said: Said, axis: str, subject: str, effects: Mapping[str, Effect], m
     if base.empty:
         return blank(f"no held-out error: {_why_no_error(coverage)}")
     floor = float(base["noise_floor_mm"].iloc[0])
-    errors = {
+    errors: dict[str, float | None] = {
         "base_error_mm": float(base["error_mm"].iloc[0]), "model_error_mm": float(rungs["error_mm"].iloc[-1]),
         "final_error_mm": None, "noise_floor_mm": floor if floor == floor else None,
     }  # fmt: skip
@@ -165,10 +171,10 @@ def _plant(said: Said, axis: str, subject: str, effects: Mapping[str, Effect], m
         why = about["reason"].iloc[0] if len(about) else "no trial could be used"
         return blank("; ".join([f"not judged: {why}", *notes])) | errors
     rows = said.candidates[(said.candidates["axis"] == axis) & (said.candidates["subject"] == subject)]
-    out = errors | findings.block(about.iloc[0], rows, effects, model)
+    out: dict[str, Any] = errors | findings.block(about.iloc[0], rows, effects, model)
     if not out["missing"] and not out["unexplained"]:
         out["final_error_mm"] = errors["base_error_mm"]
-    return out | {"reason": "; ".join([out["reason"], *notes])}
+    return out | {"reason": "; ".join([str(out["reason"]), *notes])}
 
 
 def _control(said: Said, axis: str, subject: str, effects: Mapping[str, Effect], model: Sequence[str]) -> dict[str, Any]:

@@ -5,13 +5,17 @@ from pathlib import Path
 
 from snakemake.iocontainers import Snakemake
 
-from plumbline import job, tables
-from plumbline.ladder import ladder, verdict
+from plumbline import config, job, tables
+from plumbline.effects import catalogue
+from plumbline.ladder import Said, ladder, verdict
 
 snakemake: Snakemake
 stamp = job.start(snakemake)
-heldout = tables.read_all("heldout", snakemake.input.heldout)
-table = ladder(heldout)
+effects = catalogue(Path("."))
+heldout, rungs, control, coverage = (tables.read_all(n, snakemake.input[n]) for n in ("heldout", "rungs", "control", "coverage"))
+judged, tried = (tables.read(n, snakemake.input[n]) for n in ("judged", "candidates"))
+table = ladder(heldout, rungs, control, effects)
 tables.write("ladder", table, snakemake.output.ladder, stamp)
-said = verdict(table, snakemake.params.config, tables.read_all("coverage", snakemake.input.coverage), heldout)
+models = config.models({"models": snakemake.params.models}, effects)
+said = verdict(Said(table, coverage, heldout, judged, tried, control), snakemake.params.config, effects, models)
 Path(snakemake.output.verdict).write_text(json.dumps(said, indent=1, allow_nan=False) + "\n", encoding="utf-8")

@@ -34,4 +34,5 @@ EFFECT = Effect(
     force=force,
     undo=undo,
     settled=True,
+    recorded=True,
 )

@@ -22,4 +22,5 @@ EFFECT = Effect(
     separated="a tilted rod on the plate; the plate's geometry: a fitted w2 takes all of it",
     columns=columns,
     twin="w2",
+    recorded=True,
 )

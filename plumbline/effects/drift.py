@@ -21,4 +21,5 @@ EFFECT = Effect(
     confounded=(),
     separated="the plate empty before and after",
     columns=columns,
+    recorded=True,
 )

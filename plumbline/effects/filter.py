@@ -28,4 +28,5 @@ EFFECT = Effect(
     columns=columns,
     force=force,
     twin="sync",
+    recorded=True,
 )

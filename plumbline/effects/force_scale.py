@@ -27,4 +27,5 @@ EFFECT = Effect(
     separated="a static trial on a balance; the vertical equation",
     columns=columns,
     force=force,
+    recorded=True,
 )

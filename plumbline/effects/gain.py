@@ -33,4 +33,5 @@ EFFECT = Effect(
     columns=columns,
     values=values,
     undo=undo,
+    recorded=True,
 )

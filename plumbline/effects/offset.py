@@ -21,4 +21,5 @@ EFFECT = Effect(
     confounded=("com_bias", "tilt"),
     separated="the CoP of each plate against the markers of its foot; an empty plate; static poses in several places",
     columns=columns,
+    recorded=True,
 )

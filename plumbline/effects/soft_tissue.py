@@ -33,4 +33,5 @@ EFFECT = Effect(
     columns=columns,
     force=force,
     values=values,
+    recorded=True,
 )

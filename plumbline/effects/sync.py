@@ -42,4 +42,5 @@ EFFECT = Effect(
     vertical=vertical,
     undo=undo,
     settled=True,
+    recorded=True,
 )

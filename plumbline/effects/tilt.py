@@ -27,4 +27,5 @@ EFFECT = Effect(
     separated="a level; the same stance turned by half a turn",
     columns=columns,
     force=force,
+    recorded=True,
 )

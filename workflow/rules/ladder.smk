@@ -2,7 +2,12 @@
 rule ladder:
     input:
         heldout=parts("heldout"),
+        rungs=parts("rungs"),
+        control=parts("control"),
         coverage=parts("coverage"),
+        judged="results/judged.parquet",
+        candidates="results/candidates.parquet",
+        effects=EFFECTS,
     output:
         ladder="results/ladder.parquet",
         verdict="results/verdict.json",
@@ -11,5 +16,6 @@ rule ladder:
     params:
         code=code("ladder.py"),
         config=config["evaluation"],
+        models=config["models"],
     script:
         "../../scripts/ladder.py"
