@@ -74,7 +74,7 @@ def study(job: Job, judge: Judge | None = None, **laboratory: Any) -> dict[str, 
 
 def _own_judge() -> Judge:
     """The project's own."""
-    from plumbline.criticism import verdict_of_tables
+    from plumbline.whole import verdict_of_tables
 
     return verdict_of_tables
 

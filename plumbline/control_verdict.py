@@ -54,7 +54,7 @@ def judge(
 
 
 UNSETTLED = {
-    "missing": None, "unexplained": False, "description": "",
+    "missing": None, "unexplained": None, "description": "",
     "reason": "not judged: the plant equation lacks something that no effect explains, and it would pass for a fault of the law",
 }  # fmt: skip
 
@@ -97,7 +97,7 @@ def trials(table: pd.DataFrame, names: Sequence[str]) -> tuple[Array, Array]:
 def _unjudged(reason: str) -> dict[str, Any]:
     """The block where nothing can be said."""
     errors: dict[str, Any] = dict.fromkeys(("base_error_mm", "model_error_mm", "final_error_mm", "noise_floor_mm"))
-    return errors | {"missing": None, "unexplained": False, "description": "", "reason": reason}
+    return errors | {"missing": None, "unexplained": None, "description": "", "reason": reason}
 
 
 def _described(left: "_Step", sums: "_Sums", found: str, known: Mapping[str, Effect]) -> str:

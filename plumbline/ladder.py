@@ -1,7 +1,7 @@
 """The ladder: held-out error of each model, and the verdict other programs read."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -9,11 +9,12 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from plumbline import control_verdict, findings
-from plumbline.effects import Effect
+from plumbline.effects import Effect, catalogue
 from plumbline.plant import AXES
-from plumbline.tables import TABLES
+from plumbline.tables import TABLES, empty
 
 Array = NDArray[np.float64]
+Models = Sequence[tuple[str, Sequence[str]]]
 
 RESAMPLES = 2000
 SEED = 20130101  # the intervals are the same at each run
@@ -22,12 +23,17 @@ NOTHING = {"kind": "weak"} | dict.fromkeys(("error_mm", "ci_low_mm", "ci_high_mm
 """The base rung where no trial could be judged."""
 
 
-def ladder(heldout: pd.DataFrame, rungs: pd.DataFrame, control: pd.DataFrame, effects: Mapping[str, Effect]) -> pd.DataFrame:
+def ladder(
+    heldout: pd.DataFrame, rungs: pd.DataFrame | None = None, control: pd.DataFrame | None = None,
+    effects: Mapping[str, Effect] | None = None,
+) -> pd.DataFrame:  # fmt: skip
     """Table `ladder`: the base rung and one per model, pooled and per task, subject and condition, weak and free-run; and of the law.
 
-    heldout, rungs, control: tables of all parts. Errors are pooled as rms over test functions (frames for the free run), in mm.
+    heldout, rungs, control: tables of all parts (None: no such rungs).  effects: the catalogue, default the library's.  Errors are
+    pooled as rms over test functions (frames for the free run), in mm.
     """
     rows: list[dict[str, Any]] = []
+    rungs = empty("rungs") if rungs is None else rungs
     noise = heldout[["trial", "axis", "noise_variance"]]
     for axis in AXES:
         mine = heldout[heldout["axis"] == axis]
@@ -39,11 +45,11 @@ def ladder(heldout: pd.DataFrame, rungs: pd.DataFrame, control: pd.DataFrame, ef
             for task, subject, condition, group in _groups(mine):
                 key = {"axis": axis, "task": task, "subject": subject, "condition": condition}
                 rows += [{"ledger": "plant", **key, "model": model, "effects": names, **r} for r in rungs_of(group)]
-    rows += control_rungs(control, effects)
+    rows += control_rungs(empty("control") if control is None else control, effects)
     return pd.DataFrame(rows, columns=[c.name for c in TABLES["ladder"]])
 
 
-def control_rungs(control: pd.DataFrame, effects: Mapping[str, Effect]) -> Iterator[dict[str, Any]]:
+def control_rungs(control: pd.DataFrame, effects: Mapping[str, Effect] | None) -> Iterator[dict[str, Any]]:
     """Rungs of the control ledger: the base law, and each effect found; error of the simulated CoM on loci left out."""
     scopes = [("all", control), *((str(s), rows) for s, rows in control.groupby("subject", observed=True))]
     for subject, rows in scopes:
@@ -108,18 +114,17 @@ class Said:
     ladder: pd.DataFrame
     coverage: pd.DataFrame
     heldout: pd.DataFrame
-    judged: pd.DataFrame
-    candidates: pd.DataFrame
-    control: pd.DataFrame
+    judged: pd.DataFrame = field(default_factory=lambda: empty("judged"))
+    candidates: pd.DataFrame = field(default_factory=lambda: empty("candidates"))
+    control: pd.DataFrame = field(default_factory=lambda: empty("control"))
 
 
-def verdict(
-    said: Said, evaluation: Mapping[str, Any], effects: Mapping[str, Effect], models: Sequence[tuple[str, Sequence[str]]]
-) -> dict[str, Any]:
+def verdict(said: Said, evaluation: Mapping[str, Any], effects: Mapping[str, Effect] | None = None, models: Models = ()) -> dict[str, Any]:
     """The interface `results/verdict.json`: the lateral axis pooled on top, then by axis and by subject.
 
-    effects: the catalogue.  models: of the config, none for `auto`.
+    effects: the catalogue, default the library's.  models: of the config, none for `auto`.
     """
+    effects = effects if effects is not None else catalogue()
     by_axis = {axis: _blocks(said, axis, "all", effects, models) for axis in AXES}
     subjects = sorted(said.coverage["subject"].unique())
     return {
@@ -132,7 +137,7 @@ def verdict(
     }
 
 
-def _model(said: Said, axis: str, models: Sequence[tuple[str, Sequence[str]]]) -> list[str]:
+def _model(said: Said, axis: str, models: Models) -> list[str]:
     """Effects of the last model configured; with `auto` those found."""
     if models:
         return list(models[-1][1])
@@ -144,9 +149,7 @@ def _model(said: Said, axis: str, models: Sequence[tuple[str, Sequence[str]]]) -
     return [*plant, *(m["effect"] for m in control or [])]
 
 
-def _blocks(
-    said: Said, axis: str, subject: str, effects: Mapping[str, Effect], models: Sequence[tuple[str, Sequence[str]]]
-) -> dict[str, Any]:
+def _blocks(said: Said, axis: str, subject: str, effects: Mapping[str, Effect], models: Models) -> dict[str, Any]:
     model = _model(said, axis, models)
     return {"plant": _plant(said, axis, subject, effects, model), "control": _control(said, axis, subject, effects, model)}
 
@@ -189,7 +192,7 @@ def _control(said: Said, axis: str, subject: str, effects: Mapping[str, Effect],
 def blank(reason: str) -> dict[str, Any]:
     """A block that claims nothing."""
     errors: dict[str, Any] = dict.fromkeys(("base_error_mm", "model_error_mm", "final_error_mm", "noise_floor_mm"))
-    return errors | {"missing": None, "unexplained": False, "description": "", "reason": reason}
+    return errors | {"missing": None, "unexplained": None, "description": "", "reason": reason}
 
 
 def _notes(floor: float, coverage: pd.DataFrame, judged: "pd.Series[bool]") -> Iterator[str]:

@@ -9,7 +9,7 @@ from plumbline import tables
 from plumbline.config import with_defaults
 from plumbline.exclusions import exclusions
 from plumbline.fit import identify
-from plumbline.ladder import ladder, verdict
+from plumbline.ladder import Said, ladder, verdict
 from plumbline.residuals import residuals
 
 RATE = 100.0  # [Hz]
@@ -44,7 +44,7 @@ def finish(out: dict[str, Any]) -> dict[str, Any]:
     out["ladder"] = _typed("ladder", ladder(out["heldout"]))
     out |= controller(out["loci"])
     out["exclusions"] = _typed("exclusions", exclusions(out["trials"], []))
-    out["verdict"] = verdict(out["ladder"], CONFIG["evaluation"], out["coverage"], out["heldout"])
+    out["verdict"] = verdict(Said(out["ladder"], out["coverage"], out["heldout"]), CONFIG["evaluation"])
     return out
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from plumbline import tables
 from plumbline.config import with_defaults
-from plumbline.ladder import error_mm, ladder, verdict
+from plumbline.ladder import Said, error_mm, ladder, verdict
 
 
 def heldout(n: int = 6, subjects: int = 2) -> pd.DataFrame:
@@ -47,7 +47,7 @@ def test_ladder_has_the_fixed_columns() -> None:
 
 def test_the_verdict_says_not_judged() -> None:
     """missing is null, never an empty list; by_axis and by_subject repeat the blocks; all numbers are finite or null."""
-    said = verdict(ladder(heldout()), with_defaults({})["evaluation"], coverage(), heldout())
+    said = verdict(Said(ladder(heldout()), coverage(), heldout()), with_defaults({})["evaluation"])
     assert said["plant"]["missing"] is None
     assert said["plant"]["unexplained"] is None
     assert said["plant"]["final_error_mm"] is None
@@ -61,14 +61,16 @@ def test_the_verdict_says_not_judged() -> None:
 def test_an_unknown_floor_is_null_and_says_why() -> None:
     """Where a file was filtered before, the floor is not zero but unknown."""
     table = heldout().assign(noise_variance=float("nan"))
-    said = verdict(ladder(table), with_defaults({})["evaluation"], coverage(filtered_before=True), table)
+    said = verdict(Said(ladder(table), coverage(filtered_before=True), table), with_defaults({})["evaluation"])
     assert said["plant"]["noise_floor_mm"] is None
     assert "low-passed before" in said["plant"]["reason"]
 
 
 def test_a_study_without_any_trial_has_a_verdict() -> None:
     """Everything excluded: nulls with a reason, not a crash."""
-    said = verdict(ladder(tables.empty("heldout")), with_defaults({})["evaluation"], tables.empty("coverage"), tables.empty("heldout"))
+    said = verdict(
+        Said(ladder(tables.empty("heldout")), tables.empty("coverage"), tables.empty("heldout")), with_defaults({})["evaluation"]
+    )
     assert said["plant"]["base_error_mm"] is None
     assert "exclusions" in said["plant"]["reason"]
 
@@ -79,7 +81,7 @@ def test_reasons_speak_of_the_judged_trials_only() -> None:
     table = table[table["trial"] == "t0"]
     known = coverage(filtered_before=True)
     known.loc[1, "com_method"] = "force"
-    reason = verdict(ladder(table), with_defaults({})["evaluation"], known, table)["plant"]["reason"]
+    reason = verdict(Said(ladder(table), known, table), with_defaults({})["evaluation"])["plant"]["reason"]
     assert "1 of the 2 trials with a CoM were judged" in reason
     assert "low-passed before" in reason
     assert "integrated from the force" not in reason
