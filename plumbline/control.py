@@ -254,7 +254,8 @@ def _framewise(search: _Search, names: tuple[str, ...], best: Settled) -> tuple[
                 continue
             got = _refined(search, got, name) if _cost(plain) - _cost(got) > ACCEPTED else got
             rows += search.rows(got)
-            gain = loop_error.gain(base, search.score(got), search.stage.trials)[0]
+            rivals = [got, *[found[n] for n in [name] if n in found]]  # beside the other effect, or alone better than that alone
+            gain = max(loop_error.gain(base, search.score(f), search.stage.trials)[0] for f in rivals)
             gains[name] = min(gain, gains.get(name, np.inf))
             found.setdefault(name, got)
     most = max(gains, key=lambda n: gains[n], default="")

@@ -15,7 +15,7 @@ from plumbline.tables import TABLES
 
 Array = NDArray[np.float64]
 
-DOUBT = 0.5  # share of a time taken out of the instruments below which a time of the law is not believed
+DOUBT = 1.0  # share of a time taken out of the instruments below which a time of the law is not believed
 
 
 def of_fit(got: Fit, sums: tuple[Array, ...], stage: Stage, known: Mapping[str, Effect]) -> Iterator[dict[str, Any]]:

@@ -219,7 +219,8 @@ def _matters(sums: _Sums, found: str, after: str) -> bool:
     if sums.mode == "loop":
         return sums.misfit(after) < (1 - MATTERS) * sums.misfit(found) and sums.error(after) < (1 - FALLS) * sums.error(found)
     beside = [(n, _joined(n, after)) for n in sums.names if n and after not in n.split("+")]
-    return all((sums.score(a) - sums.score(b)).sum() > 2 * COUNTS for a, b in beside if b in sums.names)
+    alone = sums.score(after).sum()
+    return all(sums.score(a).sum() - min(sums.score(b).sum(), alone) > 2 * COUNTS for a, b in beside if b in sums.names)
 
 
 def _p_value(gain: float, sizes: int) -> float:

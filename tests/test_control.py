@@ -37,8 +37,8 @@ def pendulum(seed: int, shift: float = 0.0, delay: float = 0.0) -> Tables:
 
 
 def person(folder: Path, seed: int, law: Law, **options: Any) -> Tables:
-    """Six trials of a simulated person under a law with something more."""
-    write_study(folder, [draw_subject("sub-01", seed)], trials=6, seed=seed, controller=Controller(lateral=law, **options))
+    """Five trials of a simulated person under a law with something more."""
+    write_study(folder, [draw_subject("sub-01", seed)], trials=5, seed=seed, controller=Controller(lateral=law, **options))
     return study(folder)
 
 
@@ -59,10 +59,9 @@ def base(table: pd.DataFrame) -> "pd.Series[Any]":
     return table[(table["mode"] == "loop") & (table["candidate"] == "")].iloc[0]
 
 
-@pytest.mark.parametrize(("seed", "shift"), [(11, 0.0), (12, 0.02)])
-def test_a_clean_law_is_not_accused(seed: int, shift: float) -> None:
-    """Nothing missing, gains within 5 % of the truth also where the plates are 20 mm off; one error, the floor at most 10 % below it."""
-    table = ledger(pendulum(seed, shift))
+def test_a_clean_law_is_not_accused() -> None:
+    """Plates 20 mm off: nothing missing, gains within 5 % of the truth; one error, the floor at most 10 % below it."""
+    table = ledger(pendulum(11, shift=0.02))
     block = judge(table)
     assert block["missing"] == []
     assert not block["unexplained"]
@@ -156,7 +155,7 @@ def test_the_disclosed_studies_with_nothing_in_the_law(shared_data: Path, name: 
 
 def test_too_few_loci_are_not_judged() -> None:
     """Three loci: no verdict, the errors null, the reason says how many are needed."""
-    tables = pendulum(11)
+    tables = pendulum(11, shift=0.02)
     few = tables | {"loci": tables["loci"].head(3)}
     block = judge(ledger(few))
     assert block["missing"] is None
@@ -166,7 +165,7 @@ def test_too_few_loci_are_not_judged() -> None:
 
 def test_without_the_task_there_is_no_verdict() -> None:
     """A study of another task has no rows and says what the ledger needs."""
-    tables = pendulum(11)
+    tables = pendulum(11, shift=0.02)
     table = ledger(tables | {"loci": tables["loci"].assign(task="quiet")})
     assert table.empty
     assert "lateral" in judge(table)["reason"]
