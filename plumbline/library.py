@@ -83,6 +83,8 @@ def _functions(c: Channels, state: dict[str, Array], middle: dict[str, float], r
         out |= {(name, of): f, (f"{name}^2", f"{of}^2"): f**2, (f"{name}^3", f"{of}^3"): f**3}
         out[f"|{name}| {name}", f"|{of}| {of}"] = np.abs(f) * f
         for share in (0.15, 0.3, 0.5, 0.7, 0.85):
+            far = share * reach[name]
+            out[f"edge of {name} both", f"({of} beyond -{far:.3f}, {far:.3f})"] = f - np.clip(f, -far, far)
             for side, word in ((1.0, "above"), (-1.0, "below")):
                 edge = side * share * reach[name]
                 over = np.clip(side * f - abs(edge), 0, None)
@@ -97,8 +99,10 @@ def _functions(c: Channels, state: dict[str, Array], middle: dict[str, float], r
             s = (x / reach["x"] - at) / wide
             told = f"s exp(-s^2/2), s = (x {-at * reach['x'] - middle['x']:+.3f})/{wide * reach['x']:.3f}"
             out["place", f"[{told}]"] = s * np.exp(-(s**2) / 2)
-    for time in (0.5, 1.0, 2.0, 4.0):
-        out["memory", f"(p of the last {time:g} s)"] = _slow(p, time * rate)
+    for time in (0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0):
+        slow = _slow(p, time * rate)
+        out["memory", f"(p of the last {time:g} s)"] = slow
+        out["memory", f"(p of the last {time:g} s, from its mean in the trial)"] = slow - slow.mean()  # plates are zeroed trial by trial
     for name in ("com_z", "com_y", "com_y_dot", "ang_mom", "ang_mom_dot", "grf_y", "grf_z"):
         if c.has(name):
             out[name, name] = c[name]

@@ -63,7 +63,8 @@ def structure(
     """Ask what is left of one equation.
 
     windows: of each trial.  terms: their library.  residual: (n,) of each.  equation: its name.  usual: rms that noise and a model's
-    usual faults give, in the residual's unit.  beside: columns that were fitted before, (n, q) of each.  seed: of the flips.
+    usual faults give, in the residual's unit; NaN where not known, and nothing is decided.  beside: columns that were fitted before,
+    (n, q) of each.  seed: of the flips.
     """
     rng = np.random.default_rng(seed)
     y = projected(np.concatenate(list(residual))[:, None], windows, beside)[:, 0]
