@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from plumbline.evidence import Weak
-from plumbline.library import Library, cost, fits
+from plumbline.library import Library, cost, fits, line
 from plumbline.search import FOLDS, design
 
 Array = NDArray[np.float64]
@@ -89,6 +89,26 @@ def projected(values: Array, windows: Sequence[Weak], beside: Sequence[Array] | 
         a = np.column_stack([np.ones(here.sum()), *([np.concatenate(fitted)] if fitted else [])])
         out[here] -= a @ _coefficients(a, out[here])
     return out
+
+
+def offered(windows: Sequence[Weak], terms: Library, equation: str, beside: Sequence[Array] | None) -> tuple[Index, Array]:
+    """Terms that may stand in an equation and are not taken by what was fitted; and all (N, K) with that taken out.
+
+    Where x - p stands on the left and p is fitted, x is what is left: a bent function of x or p would profit from its straight part,
+    which belongs to a gain or a scale, so a line is taken out first.
+    """
+    raw = np.concatenate(terms.values)
+    x = projected(raw, windows, None)
+    for k, family in enumerate(terms.families):
+        straight = line(family) if UNITS[equation] == "m" else ""
+        if straight in terms.families:
+            of = x[:, terms.families.index(straight)]
+            x[:, k] = x[:, k] - of * float(x[:, k] @ of) / max(float(of @ of), 1e-300)
+    bent = np.mean(x**2, axis=0)
+    x = projected(x, windows, beside)
+    variance = raw.var(axis=0)
+    own = (np.mean(x**2, axis=0) > ABSORBED * bent) & (bent > ABSORBED**2 * variance) & (variance > 1e-20)
+    return np.flatnonzero(own & np.array([fits(family, equation) for family in terms.families])), x
 
 
 # -- rhythms -----------------------------------------------------------------------------------------------------------
@@ -174,15 +194,16 @@ def _candidates(
     """The best of each family that may stand in the equation, is not taken by what was fitted, and does not live in one trial only."""
     y = projected(np.concatenate(list(residual))[:, None], windows, beside)[:, 0]
     name, wave = _rhythm(windows, y, beside)
-    raw, names, families = np.column_stack([*np.concatenate(terms.values).T, wave]), [*terms.names, name], [*terms.families, "rhythm"]
-    x = projected(raw, windows, beside)
+    parts = tuple(np.column_stack([a, b]) for a, b in zip(terms.values, split(wave, windows), strict=True))
+    terms = Library((*terms.names, name), (*terms.families, "rhythm"), parts)
+    raw, names, families = np.concatenate(terms.values), terms.names, terms.families
+    usable, x = offered(windows, terms, equation, beside)
     square = np.maximum(np.sum(x**2, axis=0), 1e-300)
-    whole = len(x) * raw.var(axis=0)
     crowded = (np.max([np.sum(part**2, axis=0) for part in split(x, windows)], axis=0) > ALONE * square) & (len(windows) >= 3)
     r = np.abs(x.T @ y) / np.maximum(np.sqrt(square) * np.linalg.norm(y), 1e-300)
     best: dict[str, int] = {}
-    for k in np.flatnonzero((square > ABSORBED * whole) & (whole > 1e-20) & ~crowded):
-        if fits(families[k], equation) and r[k] > r[best.get(families[k], k)] - (families[k] not in best):
+    for k in usable[~crowded[usable]]:
+        if r[k] > r[best.get(families[k], k)] - (families[k] not in best):
             best[families[k]] = int(k)
     here = _distinct(x, sorted(best.values(), key=lambda k: -r[k]))
     return _Search([names[k] for k in here], np.array([cost(families[k]) for k in here]), raw[:, here], x[:, here], y, _folds(windows))

@@ -14,6 +14,7 @@ Array = NDArray[np.float64]
 Functions = dict[tuple[str, str], Array]
 
 SMOOTH = 0.1  # [s] half width of the bump that x and v are smoothed with before a nonlinear function is taken of them
+NOISY = 0.2  # [1] share of a second derivative that may be noise of the markers
 COST = {"edge": 1.5, "place": 3.0, "memory": 1.5, "rhythm": 1.5}
 """What a term of a family counts: those whose place or time was looked for count more; the others one."""
 DRIVES = ("x", "x^2", "x^3", "|x| x", "v", "v^2", "v^3", "|v| v", "x v", "t", "rubbing", "place", "rhythm", "com_z", "com_y", "com_y_dot")
@@ -62,9 +63,12 @@ def _terms(c: Channels, plant: Plant, state: dict[str, Array], middle: dict[str,
     bump, picked = plant.bump, plant.picked
     frames = _functions(c, state, middle, reach, plant.rate)
     out = {key: bump.mean(f)[picked] for key, f in frames.items()}
+    x = state["x"] - middle["x"]
     for power in (2, 3):  # a picture that is warped shows in x'' as the second derivative of the warp
-        f = (state["x"] - middle["x"]) ** power
-        out[f"warp{power}", f"(d/dt)^2 {_shifted('x', middle)}^{power}"] = bump.second(f)[picked]
+        warp = bump.second(x**power)[picked]
+        noise = plant.noise_x * np.sqrt(np.mean((power * x ** (power - 1)) ** 2) * (bump.curvature @ bump.curvature))
+        if not noise > NOISY * warp.std():  # it shares its noise with x''
+            out[f"warp{power}", f"(d/dt)^2 {_shifted('x', middle)}^{power}"] = warp
     return {key: f for key, f in out.items() if np.isfinite(f).all()}
 
 
@@ -99,7 +103,7 @@ def _functions(c: Channels, state: dict[str, Array], middle: dict[str, float], r
             s = (x / reach["x"] - at) / wide
             told = f"s exp(-s^2/2), s = (x {-at * reach['x'] - middle['x']:+.3f})/{wide * reach['x']:.3f}"
             out["place", f"[{told}]"] = s * np.exp(-(s**2) / 2)
-    for time in (0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0):
+    for time in (1.0, 1.4, 2.0, 2.8, 4.0):
         slow = _slow(p, time * rate)
         out["memory", f"(p of the last {time:g} s)"] = slow
         out["memory", f"(p of the last {time:g} s, from its mean in the trial)"] = slow - slow.mean()  # plates are zeroed trial by trial
@@ -127,6 +131,13 @@ def fits(family: str, equation: str) -> bool:
     if equation in ("kinematic", "vertical"):
         return family in DRIVES or family.startswith(("edge of x", "edge of v", "warp"))
     return family not in ("x", "p", "place") and not family.startswith("warp")
+
+
+def line(family: str) -> str:
+    """Channel whose straight line is taken out of a family where x - p stands on the left; "" for none."""
+    if family.startswith(("x^", "|x|", "edge of x")):
+        return "x"
+    return "p" if family.startswith(("p^", "|p|", "edge of p", "memory")) else ""
 
 
 def cost(family: str) -> float:

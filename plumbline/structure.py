@@ -15,17 +15,16 @@ from numpy.typing import NDArray
 from scipy.special import stdtr
 
 from plumbline.evidence import Weak
-from plumbline.formulas import projected, split
-from plumbline.library import Library, fits
+from plumbline.formulas import offered, projected, split
+from plumbline.library import Library
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 FLIPS = 4000  # of the signs of blocks
 SURE = 0.005  # [1] p below which a residual follows something: some ten tests make a verdict
-LARGE = 0.6  # [1] of the noise that the rms of what it follows must reach
+LARGE = 0.65  # [1] of the noise that the rms of what it follows must reach, and the whole residual beyond the noise
 OVER = 1.5  # [1] residual over noise that is too much, whatever it follows
-ABSORBED = 0.02  # [1] share of a channel that the fitted columns must leave
 BLOCK = 1.5  # supports of the bump that make an independent block
 
 WORDS = {
@@ -77,7 +76,8 @@ def structure(
     size = {k: abs(v) * rms / usual for k, v in r.items()}
     size |= {"trial": np.sqrt(between) * rms / usual, "itself": np.sqrt(max(memory, 0.0)) * rms / usual}
     r |= {"trial": between, "itself": memory}
-    found = [k for k in p if p[k] < SURE and size[k] > LARGE]
+    beyond = np.sqrt(max((rms / usual) ** 2 - 1.0, 0.0))  # a channel that shares its noise with the residual follows it inside the noise
+    found = [k for k in p if p[k] < SURE and min(size[k], beyond) > LARGE]
     return Structure(bool(found) or rms > OVER * usual, p, r, size, _told(found, p, r, size, rms / usual))
 
 
@@ -113,12 +113,9 @@ def _channels(
     windows: Sequence[Weak], terms: Library, y: Array, equation: str, beside: Sequence[Array] | None, block: Index, flips: Array
 ) -> tuple[dict[str, float], dict[str, float]]:
     """p-values over all channels and correlations of each."""
-    tried = [k for k, family in enumerate(terms.families) if family in WORDS and fits(family, equation)]
-    raw = np.concatenate(terms.values)[:, tried]
-    x = projected(raw, windows, beside)
-    variance = raw.var(axis=0)
-    own = (np.mean(x**2, axis=0) > ABSORBED * variance) & (variance > 1e-20)
-    x, names = x[:, own], [terms.families[k] for k, ok in zip(tried, own, strict=True) if ok]
+    usable, columns = offered(windows, terms, equation, beside)
+    tried = [k for k in usable if terms.families[k] in WORDS]
+    x, names = columns[:, tried], [terms.families[k] for k in tried]
     r = x.T @ y / np.maximum(np.linalg.norm(x, axis=0) * np.linalg.norm(y), 1e-300)
     scores = np.stack([_by_block(y, column, block) for column in x.T], axis=1)
     scale = np.sqrt(np.sum(scores**2, axis=0)) + 1e-300

@@ -25,10 +25,7 @@ LABORATORY = {"people": 1, "trials": 6, "duration": 10.0, "rate": 100.0, "force_
 
 @dataclass
 class Hidden:
-    """Windows of the lateral axis, the library, w2 of the base model, and the true residual by equation, of each trial.
-
-    picture: of the kinematic side where the markers are wrong; their noise is in it.
-    """
+    """Windows of the lateral axis, the library, w2 of the base model, and the true residual by equation, of each trial."""
 
     windows: list[Weak]
     terms: Library
@@ -46,7 +43,7 @@ def study(name: str, seed: int, *, share: float = 0.7, **laboratory: Any) -> Hid
     stages._loci()
     t = stages.tables
     plants = {k: e for k, e in catalogue().items() if e.ledger == "plant" and e.columns is not None and not e.twin}
-    windows, pairs, truth = [], [], {"kinematic": [], "moment": [], "picture": []}
+    windows, pairs, truth = [], [], {"kinematic": [], "moment": []}
     options = {k: EVALUATION[k] for k in ("half_width", "exponent")}
     lived = {f"{one.subject.participant_id}_task-lateral_run-{one.run:02d}": one for one in trials}
     for about, frames, found in of_trials(t["signals"], t["pushes"], t["coverage"], axes=("lateral",), **options):
@@ -57,5 +54,4 @@ def study(name: str, seed: int, *, share: float = 0.7, **laboratory: Any) -> Hid
         n = len(plant.x)
         truth["kinematic"].append(plant.bump.mean(one.truth["outside_x"][:n] / one.subject.mass)[plant.picked])
         truth["moment"].append(plant.bump.mean(one.truth["zmp_x"][:n] - channels.zmp_x)[plant.picked])
-        truth["picture"].append((plant.acceleration - plant.bump.mean(one.truth["com_ddot_x"][:n]))[plant.picked])
     return Hidden(windows, library(pairs), G / float(np.mean([w.height for w in windows])), truth)
