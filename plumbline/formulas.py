@@ -54,12 +54,13 @@ class Formula:
 # -- what is left ------------------------------------------------------------------------------------------------------
 
 
-def remains(windows: Sequence[Weak], effects: Sequence[str], w2: float, equation: str) -> tuple[list[Array], list[Array]]:
+def remains(windows: Sequence[Weak], effects: Sequence[str], w2: float, equation: str, h: float = 0.0) -> tuple[list[Array], list[Array]]:
     """Residual of an equation after some effects, (n,) of each trial, and the columns that were fitted, (n, q).
 
-    windows: of one subject and axis.  w2: of the base model [1/s2].  The equation is fitted by itself.
+    windows: of one subject and axis.  w2: (z'' + g)/z [1/s2].  h: lever per acceleration [s2], 1/w2 where not given. The equation
+    is fitted by itself.
     """
-    made = [design(w, equation, effects, w2) for w in windows]
+    made = [design(w, equation, effects, w2, h or 1.0 / w2) for w in windows]
     columns = np.concatenate([a for a, _ in made])
     used = np.flatnonzero(np.any(columns != 0, axis=0))
     a, y = columns[:, used], np.concatenate([b for _, b in made])

@@ -1,13 +1,16 @@
 """Candidate terms of what a residual may look like: bump means of functions of the channels, nothing differentiated twice."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
-from plumbline.effects import Channels
-from plumbline.plant import Plant
+from plumbline.effects import Channels, Effect
+from plumbline.effects._channels import of_trial
+from plumbline.evidence import Weak
+from plumbline.plant import rows_of
 from plumbline.weak import Bump
 
 Array = NDArray[np.float64]
@@ -33,21 +36,37 @@ class Library:
     values: tuple[Array, ...]
 
 
-def library(trials: Iterable[tuple[Channels, Plant]]) -> Library:
-    """Candidate terms of one axis, of one subject or of several who stood in the same place; trials in the order of their windows."""
-    states = [(c, plant, _state(c, plant)) for c, plant in trials]
-    middle = {k: _middle(np.concatenate([s[k] for _, _, s in states])) for k in ("x", "p")}
+def channels(
+    windows: Sequence[Weak], signals: pd.DataFrame, coverage: pd.DataFrame, effects: Mapping[str, Effect]
+) -> Iterator[tuple[Channels, Weak]]:
+    """The channels that windows were made from, what was taken out of them taken out again; trial by trial."""
+    rows = signals.groupby("trial", observed=True).indices
+    heights = coverage.groupby("subject", observed=True)["height_com"].mean()
+    for w in windows:
+        c = of_trial(rows_of(signals, rows[w.trial]), w.axis, w.mass, heights[w.subject])
+        for name, theta in w.centre.items():
+            c = effects[name].undo(c, theta)  # type: ignore[misc]
+        yield c, w
+
+
+def library(trials: Iterable[tuple[Channels, Weak]]) -> Library:
+    """Candidate terms of one axis, of one subject or of several who stood in the same place.
+
+    trials: the channels of each with its windows.
+    """
+    states = [(c, w, _state(c, w.bump.rate)) for c, w in trials]
+    middle = {k: _middle(np.concatenate([s[k] for *_, s in states])) for k in ("x", "p")}
     reach = {
-        k: float(np.nanquantile(np.abs(np.concatenate([s[k] for _, _, s in states]) - middle.get(k, 0.0)), 0.97)) for k in ("x", "v", "p")
+        k: float(np.nanquantile(np.abs(np.concatenate([s[k] for *_, s in states]) - middle.get(k, 0.0)), 0.97)) for k in ("x", "v", "p")
     }
-    made = [_terms(c, plant, s, middle, reach) for c, plant, s in states]
+    made = [_terms(c, w, s, middle, reach) for c, w, s in states]
     names = [k for k in made[0] if all(k in m for m in made)]
     return Library(tuple(n for _, n in names), tuple(f for f, _ in names), tuple(np.column_stack([m[k] for k in names]) for m in made))
 
 
-def _state(c: Channels, plant: Plant) -> dict[str, Array]:
+def _state(c: Channels, rate: float) -> dict[str, Array]:
     """x and v smoothed, p as it is, (n,)."""
-    bump = Bump(max(SMOOTH, 4.5 / plant.rate), 4, plant.rate)
+    bump = Bump(max(SMOOTH, 4.5 / rate), 4, rate)
     x, v = bump.mean(c.com_x), bump.derivative(c.com_x)
     return {"x": np.where(np.isfinite(x), x, c.com_x), "v": np.where(np.isfinite(v), v, c.com_x_dot), "p": c.zmp_x}
 
@@ -58,15 +77,15 @@ def _middle(f: Array) -> float:
     return median if abs(median) > 0.2 * float(np.nanquantile(np.abs(f - median), 0.97)) else 0.0
 
 
-def _terms(c: Channels, plant: Plant, state: dict[str, Array], middle: dict[str, float], reach: dict[str, float]) -> Functions:
+def _terms(c: Channels, w: Weak, state: dict[str, Array], middle: dict[str, float], reach: dict[str, float]) -> Functions:
     """(family, name) -> weak values at the picked frames; those that a gap touches are left out."""
-    bump, picked = plant.bump, plant.picked
-    frames = _functions(c, state, middle, reach, plant.rate)
+    bump, picked = w.bump, w.frame
+    frames = _functions(c, state, middle, reach, bump.rate)
     out = {key: bump.mean(f)[picked] for key, f in frames.items()}
     x = state["x"] - middle["x"]
     for power in (2, 3):  # a picture that is warped shows in x'' as the second derivative of the warp
         warp = bump.second(x**power)[picked]
-        noise = plant.noise_x * np.sqrt(np.mean((power * x ** (power - 1)) ** 2) * (bump.curvature @ bump.curvature))
+        noise = w.noise["x"] * np.sqrt(np.mean((power * x ** (power - 1)) ** 2) * (bump.curvature @ bump.curvature))
         if not noise > NOISY * warp.std():  # it shares its noise with x''
             out[f"warp{power}", f"(d/dt)^2 {_shifted('x', middle)}^{power}"] = warp
     return {key: f for key, f in out.items() if np.isfinite(f).all()}

@@ -10,11 +10,9 @@ import numpy as np
 from made_study import EVALUATION
 
 from plumbline.effects import catalogue
-from plumbline.effects._channels import of_trial
-from plumbline.evidence import Weak, of_one
-from plumbline.library import Library, library
+from plumbline.evidence import Weak, of_part
+from plumbline.library import Library, channels, library
 from plumbline.physics import G
-from plumbline.plant import of_trials
 from plumbline.simulate.cohort import draw
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -42,16 +40,12 @@ def study(name: str, seed: int, *, share: float = 0.7, **laboratory: Any) -> Hid
     stages._signals()
     stages._loci()
     t = stages.tables
-    plants = {k: e for k, e in catalogue().items() if e.ledger == "plant" and e.columns is not None and not e.twin}
-    windows, pairs, truth = [], [], {"kinematic": [], "moment": []}
-    options = {k: EVALUATION[k] for k in ("half_width", "exponent")}
+    windows = list(of_part(t["signals"], t["pushes"], t["coverage"], effects := catalogue(), EVALUATION, axis="lateral"))
+    truth = {"kinematic": [], "moment": []}
     lived = {f"{one.subject.participant_id}_task-lateral_run-{one.run:02d}": one for one in trials}
-    for about, frames, found in of_trials(t["signals"], t["pushes"], t["coverage"], axes=("lateral",), **options):
-        plant, one = found["lateral"], lived[about["trial"]]
-        channels = of_trial(frames, "lateral", float(about["mass"]))
-        windows.append(of_one(about, channels, "lateral", plant, plants))
-        pairs.append((channels, plant))
-        n = len(plant.x)
-        truth["kinematic"].append(plant.bump.mean(one.truth["outside_x"][:n] / one.subject.mass)[plant.picked])
-        truth["moment"].append(plant.bump.mean(one.truth["zmp_x"][:n] - channels.zmp_x)[plant.picked])
+    pairs = list(channels(windows, t["signals"], t["coverage"], effects))
+    for c, w in pairs:
+        one, n = lived[w.trial], len(c.time)
+        truth["kinematic"].append(w.bump.mean(one.truth["outside_x"][:n] / one.subject.mass)[w.frame])
+        truth["moment"].append(w.bump.mean(one.truth["zmp_x"][:n] - c.zmp_x)[w.frame])
     return Hidden(windows, library(pairs), G / float(np.mean([w.height for w in windows])), truth)
