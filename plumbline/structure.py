@@ -74,11 +74,11 @@ def structure(
     p["trial"], between = _between(windows, y, block, flips)
     p["itself"], memory = _memory(windows, y)
     size = {k: abs(v) * rms / usual for k, v in r.items()}
-    size |= {"trial": np.sqrt(between) * rms / usual, "itself": np.sqrt(max(memory, 0.0)) * rms / usual}
+    size |= {"trial": between**0.5 * rms / usual, "itself": max(memory, 0.0) ** 0.5 * rms / usual}
     r |= {"trial": between, "itself": memory}
     beyond = np.sqrt(max((rms / usual) ** 2 - 1.0, 0.0))  # a channel that shares its noise with the residual follows it inside the noise
     found = [k for k in p if p[k] < SURE and min(size[k], beyond) > LARGE]
-    return Structure(bool(found) or rms > OVER * usual, p, r, size, _told(found, p, r, size, rms / usual))
+    return Structure(bool(found or rms > OVER * usual), p, r, size, _told(found, p, r, size, rms / usual))
 
 
 def _told(found: Sequence[str], p: Mapping[str, float], r: Mapping[str, float], size: Mapping[str, float], over: float) -> str:
