@@ -9,7 +9,7 @@ from scipy.special import stdtr
 
 from plumbline.effects import Effect
 from plumbline.search import Fit, Sums, fit, heldout, residual_variance, solve, subsets
-from plumbline.shapes import SHAPES
+from plumbline.shapes import BESIDE, SHAPES
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -234,7 +234,7 @@ def twins(all_sums: Sequence[Sums], weight: Array, names: Set) -> dict[str, set[
 
 def search(case: Case) -> tuple[Set, list[Refused]]:
     """The set with the least score, counting FALL for each member, and the sets that would be better but cannot be."""
-    sets = subsets(case.rivals, min(MOST, len(case.rivals)), case.twins)
+    sets = [k for k in subsets(case.rivals, min(MOST, len(case.rivals)), case.twins) if all(BESIDE[n] in k for n in k if n in BESIDE)]
     variance = case.variance(case.errors(sets))
     score = case.score(variance) + FALL * np.array([len(names) for names in sets])
     refused: list[Refused] = []

@@ -5,15 +5,15 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
+from scipy.special import stdtr, stdtrit
 
+from plumbline import outer
 from plumbline.constants import constants
 from plumbline.contest import FALL, SURE, Case, Need, Refused, beyond, case_of, constant, need, pruned, search
 from plumbline.effects import Effect
 from plumbline.evidence import Weak
-from plumbline.physics import G
-from plumbline.search import Fit, Sums, sums
-from plumbline.shapes import SHAPES
+from plumbline.search import BASE, Fit, Sums, design, sums
+from plumbline.shapes import BESIDE, SHAPES
 
 Array = NDArray[np.float64]
 Set = tuple[str, ...]
@@ -22,9 +22,9 @@ Interval = tuple[float, float, float]
 FAULT = 0.005  # [1] of the motion that a segment table and rigid segments leave in any study
 LEFT = 1.35  # [1] residual over noise floor and that, above which something is left
 PLAIN = 2.0  # [1] fall of the score that an effect must bring to be named where something is left that nobody explains
-LOAD = 0.02  # [1] of body weight that must be missing on the plates before a contact that no plate measures is thought of
+CONTACT = "push"  # found in time, see outer.py
 LEANS = 1.1  # [1] h times w2 of a person who stands with an upright trunk, to begin with
-SHOWS = 0.4  # [1] of what noise and usual faults leave, by which an effect of any motion must lower the rms to be named
+SHOWS = 0.6  # [1] of what noise and usual faults leave, by which an effect of any motion must lower the rms to be named
 SAME = 0.1  # [1] share of its fall that a member may lose when another effect takes its place, and the data cannot tell them apart
 ALWAYS = ("ang_mom", "height")  # physics has them in any motion; what they explain is not left, named or not
 CONSTANTS = ("offset", "tilt")  # a constant on the moment side, on the kinematic side: judged last, from what is always fitted
@@ -92,16 +92,27 @@ class Finding:
 
 
 def judge(windows: Sequence[Sequence[Weak]], effects: Mapping[str, Effect], w2: Sequence[float], h: Sequence[float] = ()) -> Finding:
-    """Judge the plant of some subjects on one axis.
+    """Judge the plant of some subjects on one axis; a contact that no plate measures is found first, and the rest judged beside it.
 
     windows: of each subject.  effects: the catalogue.  w2: of each subject, (z'' + g)/z [1/s2].
     h: lever per acceleration of each subject as far as it is known [s2].
     """
+    contacts = [outer.find(ws, float(FAULT * motion([ws], ("kinematic",))[0])) if CONTACT in effects else None for ws in windows]
+    if not any(contacts):
+        return _judge(windows, effects, w2, h)
+    still = [outer.quiet(ws, c) if c else list(ws) for ws, c in zip(windows, contacts, strict=True)]
+    able = [k for k, ws in enumerate(still) if len(ws) > 1]
+    if not able:  # nothing to compare with
+        return replace(_judge(windows, effects, w2, h), left=("kinematic",))
+    h = h or [LEANS / w for w in w2]
+    finding = _judge([still[k] for k in able], effects, [w2[k] for k in able], [h[k] for k in able])
+    return _with_contact(finding, [windows[k] for k in able], [contacts[k] for k in able], [w2[k] for k in able], [h[k] for k in able])
+
+
+def _judge(windows: Sequence[Sequence[Weak]], effects: Mapping[str, Effect], w2: Sequence[float], h: Sequence[float]) -> Finding:
     lacking = {k: v for ws in windows for w in ws for k, v in w.lacking.items() if k not in SHAPES}
     every = {k: e for k, e in {**effects, **SHAPES}.items() if all(k in w.terms for ws in windows for w in ws)}
-    load = max(float(np.sqrt(np.nanmean(w.vertical**2))) for ws in windows for w in ws)
-    idle = {"push"} if not load >= LOAD * G else set()
-    offered = [k for k in every if k not in CONSTANTS and k not in idle]
+    offered = [k for k in every if k not in CONSTANTS and k != CONTACT]
     all_sums = [sums(ws, offered, w, k) for ws, w, k in zip(windows, w2, h or [LEANS / w for w in w2], strict=True)]
     faults = FAULT * motion(windows, all_sums[0].equations)
     case, absorbed = case_of(all_sums, {**effects, **SHAPES}, offered, faults)
@@ -112,7 +123,7 @@ def judge(windows: Sequence[Sequence[Weak]], effects: Mapping[str, Effect], w2: 
 
 def _plain(case: Case, members: Set) -> Set:
     """Members without shapes where nothing is left without them, and without what any motion has where it hardly shows."""
-    few = tuple(n for n in members if n not in SHAPES)
+    few = tuple(n for n in members if n not in SHAPES or n in BESIDE)
     if few != members and not _left(case, few):
         members = few
     faint = {n for n in members if n in ALWAYS and need(case, members, n).share < SHOWS}
@@ -136,6 +147,51 @@ def _left(case: Case, members: Set) -> tuple[str, ...]:
     return tuple(e for e, w, z in zip(over, case.weight, case.as_zmp, strict=True) if w * z > 0 and over[e] > LEFT)
 
 
+# -- a contact beside the plates --------------------------------------------------------------------------------------
+
+
+def _with_contact(
+    finding: Finding, windows: Sequence[Sequence[Weak]], contacts: Sequence[outer.Contact | None], w2: Sequence[float], h: Sequence[float]
+) -> Finding:  # fmt: skip
+    """A finding about the windows without a contact, with the contact; errors are of all windows."""
+    lines, spread, gains, before, after = [], [], [], [], []
+    for ws, contact, theta, k, lever in zip(windows, contacts, finding.theta, w2, h, strict=True):
+        rest = {e: [_rest(w, e, theta, k, lever) for w in ws] for e in ("moment", "whole")}
+        before += rest["whole"]
+        if contact is None:
+            after += rest["whole"]
+            continue
+        told = outer.explained(ws, contact, rest["whole"])
+        after += told
+        lines.append(outer.line(ws, contact, rest["moment"], lever))
+        each = [outer.line(ws, contact, rest["moment"], lever, without=k) for k in range(len(ws))]
+        spread.append(np.sqrt((len(each) - 1) * np.var(each, axis=0)))  # jackknife by trial
+        gains += [
+            np.log(np.mean(a[m] ** 2) / np.mean(b[m] ** 2)) for a, b, m in zip(rest["whole"], told, contact.loud, strict=True) if m.any()
+        ]
+    names = ("force", "x", "lateral", "height")
+    values = np.array(lines)
+    few = values.std(axis=0, ddof=1) if len(lines) > 2 else np.sqrt(np.mean(np.square(spread), axis=0))
+    half = 2 * few / np.sqrt(len(lines))
+    parameters = {
+        k: (float(v), float(v - r), float(v + r)) for k, v, r in zip(names, np.median(values, axis=0), half, strict=True) if v == v
+    }
+    error = [float(np.sqrt(np.mean(np.concatenate(e) ** 2))) for e in (before, after)]
+    t = float(np.mean(gains) / (np.std(gains, ddof=1) / np.sqrt(len(gains)) + 1e-12)) if len(gains) > 1 else 0.0
+    p = float(stdtr(max(len(gains) - 1, 1), -t))
+    push = Found(CONTACT, (CONTACT,), parameters, error[0], error[1], p, p)
+    others = [c for c in finding.candidates if c.effect != CONTACT]
+    mine = Candidate(CONTACT, "found", error[1], q=p)
+    return replace(finding, found=[push, *finding.found], candidates=sorted([*others, mine], key=lambda c: c.effect), final=error[1])
+
+
+def _rest(w: Weak, equation: str, theta: Mapping[str, Array], w2: float, h: float) -> Array:
+    """What a model leaves of an equation in every window."""
+    names = [n for n in theta if not n.startswith("=")]
+    columns, left = design(w, equation, names, w2, h)
+    return np.asarray(left - columns @ np.concatenate([theta[n] for n in (*BASE, *names)]))
+
+
 # -- what is said -----------------------------------------------------------------------------------------------------
 
 
@@ -144,10 +200,9 @@ def _finding(
     windows: Sequence[Sequence[Weak]],
 ) -> Finding:  # fmt: skip
     needs = {n: need(case, members, n) for n in (*members, *case.settled) if n in members or not case.twins[n] & set(members)}
-    named = [n for n in members if n not in SHAPES]
-    named += [n for n in case.settled if n in needs and _matters(case, members, n, needs[n])]
+    named = [n for n in (*members, *case.settled) if n in needs and n not in SHAPES and _matters(case, members, n, needs[n])]
     over, left = _over(case, members), _left(case, members)
-    shapes = tuple(n for n in members if n in SHAPES)
+    shapes = tuple(n for n in members if n in SHAPES and n not in BESIDE)
     if left or shapes:  # what nobody explains may look like any effect a little
         doubtful = [n for n in named if needs[n].fall < PLAIN]
         refused = [*refused, *(Refused((n,), float("nan"), "small beside what nobody explains") for n in doubtful)]
@@ -177,8 +232,9 @@ def motion(windows: Sequence[Sequence[Weak]], equations: Sequence[str]) -> Array
 
 
 def _matters(case: Case, members: Set, name: str, needed: Need) -> bool:
-    """Whether something that is fitted always deserves a name: large enough, and needed."""
-    return bool(abs(case.middle(members, name)[0]) >= case.effects[name].parameters[0].matters) and needed.enough
+    """Whether it deserves a name: large enough, beyond its own interval, and needed."""
+    value, half = abs(float(case.middle(members, name)[0])), float(_reach(case, members, name)[0])
+    return bool(value >= case.effects[name].parameters[0].matters and value > half) and needed.enough
 
 
 def _found(case: Case, members: Set, name: str, needed: Need, final: float) -> Found:

@@ -74,6 +74,10 @@ def _viscous(c: Channels) -> Array:
     return np.asarray((c.w2 * c.com_x_dot)[:, None])
 
 
+def _posed(c: Channels) -> Array:
+    return np.asarray((c.ang_mom_dot / (c.mass * c.height))[:, None])
+
+
 def _shape(title: str, equation: str, needs: tuple[str, ...], columns: Shape, force: Shape | None = None, count: int = 1) -> Effect:
     numbers = tuple(Parameter(f"c{k}", "") for k in range(count))
     return Effect(title, "plant", equation, "this file; a shape, not a cause", needs, numbers, columns, force)
@@ -90,3 +94,8 @@ SHAPES: dict[str, Effect] = {
     "~cop_edge": _shape("a CoP that is not linear (edges)", r"\omega^2 c\,(|p| - p_0)_+", ("com_x", "zmp_x"), _cop_edge, count=2),
     "~viscous": _shape("a moment against the velocity", r"\omega^2 c\,\dot x", ("com_x", "zmp_x"), _viscous),
 }  # fmt: skip
+SHAPES["~pose"] = _shape(
+    "a segment table whose CoM errs as the trunk rolls", r"e\,\ddot\varphi", ("com_x", "grf_x", "ang_mom", "com_z"), _posed, _posed
+)
+BESIDE = {"~pose": "ang_mom"}
+"""Faults of the same measurement as an effect: they may stand beside it, and only there, without anything being unexplained."""

@@ -13,11 +13,6 @@ def columns(c: Channels) -> Array:
     return np.column_stack([c.zmp_x * load, -load, shear])
 
 
-def values(theta: Array, constant: float) -> Array:
-    """Share of the load that acts along one line (1 in physics), place and height of that line [m]."""
-    return np.array([theta[0], theta[1] / theta[0], theta[2] / theta[0]])
-
-
 EFFECT = Effect(
     title="Contact that no plate measures",
     ledger="plant",
@@ -25,12 +20,12 @@ EFFECT = Effect(
     source="balance of moments with an outer force; its size from the balance of forces",
     needs=("com_x", "com_z", "grf_x", "grf_z", "zmp_x"),
     parameters=(
-        Parameter("share", "1", 0.5, 1.5, physics=1.0, within=0.25),
+        Parameter("force", "N", -3000.0, 3000.0),
         Parameter("x", "m", -3.0, 3.0),
+        Parameter("lateral", "N", -1000.0, 1000.0),
         Parameter("height", "m", -1.0, 3.0),
     ),
     confounded=("hand",),
     separated="a load cell in the contact, or the same task without it",
     columns=columns,
-    values=values,
 )

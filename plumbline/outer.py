@@ -1,0 +1,191 @@
+r"""A contact that no plate measures (seat, box, a person): found by itself in time, then its load and its line of action.
+
+What the plates miss is :math:`F_{ex} = m\ddot x - F_x` and :math:`F_{ez} = m(\ddot z + g) - F_z`. Almost every model error leaves
+something there; a contact comes and goes, pulls to one side, and does not follow from where the body is and how fast it moves.
+Its moment tells the line:
+
+.. math:: (x - p) - h F_x/m = \bigl(h - h_e/g\bigr) F_{ex}/m + (x_e - p) F_{ez}/(m g)
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plumbline.evidence import Weak
+from plumbline.physics import G
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+LOUD = 5.0  # [1] times noise and usual faults, from which on something acts
+LOAD = 0.02  # [1] of body weight, the same for what the plates do not carry
+LATERAL = 0.004  # [1] of body weight, the same for a force to the side
+REST = 0.2  # [1] share of windows in which nothing must act
+ACTS = 0.03  # [1] and in which something must
+SIDE = 0.9  # [1] of its square that must have one sign
+EVEN = 0.02  # [1] by which a force to the side may vary while it acts, beside noise; what carries weight can be nothing else
+EVEN_NOISE = 1.5  # [1] times the noise, the same
+LONG = 0.3  # [s] that it must act at a time
+
+
+@dataclass(frozen=True)
+class Contact:
+    """What acts beside the plates on one subject, one axis.
+
+    loud: of each trial, windows in which it acts or that it touches.  pull, load: Fex, Fez of each trial's windows [N].
+    lateral, vertical: whether it pulls to the side, carries weight.
+    """
+
+    loud: tuple[Mask, ...]
+    pull: tuple[Array, ...]
+    load: tuple[Array, ...]
+    lateral: bool
+    vertical: bool
+
+
+class Line(NamedTuple):
+    """Line of action: force carried [N], place x [m] where it carries weight, force to the side [N] and its height [m]; NaN where not."""
+
+    force: float
+    x: float
+    lateral: float
+    height: float
+
+
+def find(windows: Sequence[Weak], faults: float) -> Contact | None:
+    """The contact of one subject and axis; None where none is seen, or where shear or vertical are not recorded.
+
+    faults: rms of what usual model errors leave of the acceleration [m/s2].
+    """
+    if not all(np.isfinite(w.force).all() for w in windows):
+        return None
+    side = [_centred(w.acceleration - w.force) for w in windows]
+    down = [_centred(w.vertical) if np.isfinite(w.vertical).all() else np.zeros(len(w.time)) for w in windows]
+    noise = float(np.sqrt(np.nanmean([w.floor("kinematic", 0.1) for w in windows])))
+    noise = noise if np.isfinite(noise) else float(np.median(np.abs(np.concatenate(side))))
+    lateral = _acts(windows, side, max(LOUD * np.hypot(noise, faults), LATERAL * G), float(noise))
+    floor = float(np.sqrt(np.nanmean([w.floor("vertical", 0.1) for w in windows])))
+    vertical = _acts(windows, down, max(LOUD * np.nan_to_num(floor), LOAD * G), np.inf)
+    if lateral is None and vertical is None:
+        return None
+    loud = tuple(_widened(w, m) for w, m in zip(windows, _either(lateral, vertical, windows), strict=True))
+    mass = [w.mass for w in windows]
+    pull = tuple(m * s for m, s in zip(mass, side, strict=True))
+    load = tuple(m * s for m, s in zip(mass, down, strict=True))
+    return Contact(loud, pull, load, lateral is not None, vertical is not None)
+
+
+def _centred(values: Array) -> Array:
+    """Less the value it has most of the time: of the quieter half."""
+    return np.asarray(values - np.median(values))
+
+
+def _either(a: list[Mask] | None, b: list[Mask] | None, windows: Sequence[Weak]) -> list[Mask]:
+    nothing = [np.zeros(len(w.time), bool) for w in windows]
+    return [x | y for x, y in zip(a or nothing, b or nothing, strict=True)]
+
+
+def _acts(windows: Sequence[Weak], residual: Sequence[Array], least: float, noise: float) -> list[Mask] | None:
+    """Windows in which a residual is a contact's, of each trial; None where it is not one.  noise: by which it may vary while it acts."""
+    masks = [_runs(np.abs(r) > least, w.time) for r, w in zip(residual, windows, strict=True)]
+    loud, every = np.concatenate(masks), np.concatenate(list(residual))
+    share = loud.mean()
+    if not ACTS < share < 1 - REST:
+        return None
+    square = every[loud] ** 2
+    if max(square[every[loud] > 0].sum(), square[every[loud] < 0].sum()) < SIDE * square.sum():
+        return None
+    size = float(np.sqrt(square.mean()))
+    return None if _uneven(windows, residual, masks) > max(EVEN, EVEN_NOISE * noise / size) else masks
+
+
+def _runs(loud: Mask, time: Array) -> Mask:
+    """Without runs shorter than LONG."""
+    out = loud.copy()
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], loud.view(np.int8), [0]])))
+    for a, b in zip(edges[::2], edges[1::2], strict=True):
+        if time[b - 1] - time[a] < LONG:
+            out[a:b] = False
+    return out
+
+
+def _uneven(windows: Sequence[Weak], residual: Sequence[Array], masks: Sequence[Mask]) -> float:
+    """Scatter of a contact around the mean of each time that it acts, in parts of it, away from its beginning and end.
+
+    Where the body is and how it moves tells little: someone who is pushed stands elsewhere for as long. But a spring, a wall or a magnet
+    pulls more or less as the body moves, and a contact hardly does.
+    """
+    scatter = size = 0.0
+    for w, r, loud in zip(windows, residual, masks, strict=True):
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], loud.view(np.int8), [0]])))
+        for a, b in zip(edges[::2], edges[1::2], strict=True):
+            reach = min(w.bump.half_width, (w.time[b - 1] - w.time[a]) / 3)
+            core = r[a:b][(w.time[a:b] >= w.time[a] + reach) & (w.time[a:b] <= w.time[b - 1] - reach)]
+            if len(core) > 1:
+                scatter, size = scatter + float(np.sum((core - core.mean()) ** 2)), size + float(np.sum(core**2))
+    return float(np.sqrt(scatter / size)) if size else 1.0
+
+
+def _widened(w: Weak, loud: Mask) -> Mask:
+    """With the windows whose test function reaches into a contact."""
+    out = loud.copy()
+    for time in w.time[loud]:
+        out |= np.abs(w.time - time) < w.bump.half_width
+    return out
+
+
+def quiet(windows: Sequence[Weak], contact: Contact) -> list[Weak]:
+    """Windows that the contact does not touch; trials without any are left out."""
+    return [only(w, ~loud) for w, loud in zip(windows, contact.loud, strict=True) if (~loud).sum() >= 3]
+
+
+def only(w: Weak, chosen: Mask) -> Weak:
+    """Some windows of a trial."""
+    arrays = ("frame", "time", "cluster", "com", "velocity", "zmp", "acceleration", "force", "vertical")
+    terms = {name: {part: values[chosen] for part, values in parts.items()} for name, parts in w.terms.items()}
+    return replace(w, **{k: getattr(w, k)[chosen] for k in arrays}, terms=terms)
+
+
+def line(windows: Sequence[Weak], contact: Contact, rest: Sequence[Array], h: float, without: int = -1) -> Line:
+    """Line of action of a contact.
+
+    rest: what the model without it leaves of the moment equation, of each trial [m].  h: lever per acceleration [s2].  without: trial.
+    """
+    a, y, loud = _columns(windows, contact, rest)
+    loud = loud & (np.repeat(np.arange(len(windows)), [len(w.time) for w in windows]) != without)
+    if not loud.any():
+        return Line(*[float("nan")] * 4)
+    theta, *_ = np.linalg.lstsq(a[loud], y[loud], rcond=None)
+    pull, load = (np.concatenate(v)[loud] for v in (contact.pull, contact.load))
+    names = iter(theta)
+    height = G * (h - next(names)) if contact.lateral else float("nan")
+    x = float(next(names)) if contact.vertical else float("nan")
+    # a mean that the ramps at both ends hardly lower
+    force = float(load @ load / load.sum()) if contact.vertical else float("nan")
+    return Line(force, x, float(pull @ pull / pull.sum()) if contact.lateral else float("nan"), float(height))
+
+
+def explained(windows: Sequence[Weak], contact: Contact, rest: Sequence[Array]) -> list[Array]:
+    """What is left of `rest` once the contact is in, its line told from the other trials; of each trial [m]."""
+    a, y, loud = _columns(windows, contact, rest)
+    trial = np.repeat(np.arange(len(windows)), [len(w.time) for w in windows])
+    out = np.concatenate(list(rest))
+    for k in range(len(windows)):
+        others, mine = loud & (trial != k), loud & (trial == k)
+        if others.sum() > a.shape[1] and mine.any():
+            theta, *_ = np.linalg.lstsq(a[others], y[others], rcond=None)
+            out[mine] = y[mine] - a[mine] @ theta
+    return [out[trial == k] for k in range(len(windows))]
+
+
+def _columns(windows: Sequence[Weak], contact: Contact, rest: Sequence[Array]) -> tuple[Array, Array, Mask]:
+    """Columns and left side of the moment equation with a contact, and where it acts."""
+    mass = np.concatenate([np.full(len(w.time), w.mass) for w in windows])
+    p = np.concatenate([w.zmp for w in windows])
+    pull, load = (np.concatenate(v) / mass for v in (contact.pull, contact.load))
+    y = np.concatenate(list(rest)) + (p * load / G if contact.vertical else 0.0)
+    columns = [pull] * contact.lateral + [load / G] * contact.vertical
+    return np.column_stack(columns), y, np.concatenate(contact.loud)
