@@ -12,9 +12,12 @@ from numpy.typing import NDArray
 from plumbline import evidence, findings
 from plumbline.effects import Catalogue, Effect
 from plumbline.evidence import Weak
+from plumbline.formulas import formulas, remains
+from plumbline.library import channels, library
 from plumbline.physics import G
 from plumbline.plant import AXES
 from plumbline.ranking import LEANS, Finding, judge
+from plumbline.structure import structure
 from plumbline.tables import TABLES, read
 
 Array = NDArray[np.float64]
@@ -43,7 +46,8 @@ def of_part(
             if finding is None:
                 rows.append(findings.unjudged(axis, subject, sizes([got]), too_few([got])))
                 continue
-            rows.append(findings.judged(axis, subject, finding, sizes([got]), gravity(got), lever(finding, got)))
+            told = look(got, finding, signals, mine, effects) if finding.left or finding.shapes else None
+            rows.append(findings.judged(axis, subject, finding, sizes([got]), gravity(got), lever(finding, got), told))
             tried += findings.candidates(axis, subject, finding, plant)
     return evidence.to_table(windows), _table("judged", rows), _table("candidates", tried)
 
@@ -66,7 +70,9 @@ def of_cohort(
             each = [list(evidence.from_table(t[t["axis"] == axis])) for t in (evidence_of[s] for s in able["subject"])]
             finding = together(each, able["h"].tolist(), plant)
             w2 = float(np.mean([gravity(w) for w in each]))
-            rows.append(_table("judged", [findings.judged(axis, "all", finding, sizes(each), w2, float(able["h"].mean()))]))
+            most = max((findings.Told(r["follows"], json.loads(r["formulas"])) for _, r in able.iterrows()), key=lambda t: len(t.formulas))
+            told = most if finding.left or finding.shapes else None
+            rows.append(_table("judged", [findings.judged(axis, "all", finding, sizes(each), w2, float(able["h"].mean()), told)]))
             more.append(_table("candidates", list(findings.candidates(axis, "all", finding, plant))))
         else:
             said = alone.loc[alone["axis"] == axis, "reason"]
@@ -120,6 +126,21 @@ def settled(
         if not _moved(before, out, plant) and abs(h / last - 1) < NEAR:
             break
     return windows, finding
+
+
+def look(
+    windows: Sequence[Weak], finding: Finding, signals: pd.DataFrame, coverage: pd.DataFrame, effects: Mapping[str, Effect]
+) -> findings.Told:  # fmt: skip
+    """What the residual looks like that a finding about one subject leaves, in the equation where most is left."""
+    equation = max(finding.left, key=lambda k: finding.over[k]) if finding.left else findings.place(finding.shapes, finding.over)
+    w2, h = gravity(windows), lever(finding, windows)
+    named = [f.effect for f in finding.found]
+    always = [k for k, e in effects.items() if e.settled and k in finding.theta[0]]
+    rest, beside = remains(windows, [k for k in dict.fromkeys((*always, *named)) if k in windows[0].terms], w2, equation, h)
+    usual = float(np.sqrt(np.mean([w.floor(equation, h) for w in windows])))
+    terms = library(channels(windows, signals, coverage, effects))
+    said = structure(windows, terms, rest, equation, usual, beside)
+    return findings.Told(said.text if said.left else "", [f.text for f in formulas(windows, terms, rest, equation, beside)])
 
 
 def together(each: Sequence[Sequence[Weak]], h: Sequence[float], plant: Mapping[str, Effect]) -> Finding:

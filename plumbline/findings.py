@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -20,21 +20,29 @@ WHERE = {
 }
 
 
-def judged(axis: str, subject: str, finding: Finding, sizes: tuple[int, int], w2: float, h: float) -> Row:
-    """Row of `judged`.  sizes: trials and pieces."""
+def judged(axis: str, subject: str, finding: Finding, sizes: tuple[int, int], w2: float, h: float, told: "Told | None" = None) -> Row:
+    """Row of `judged`.  sizes: trials and pieces.  told: what the residual that is left looks like."""
     theta = {k: v.tolist() for k, v in finding.theta[0].items()} if len(finding.theta) == 1 else {}
     return {
         "axis": axis, "subject": subject, "trials": sizes[0], "pieces": sizes[1], "base": finding.base, "final": finding.final,
         "floor": finding.floor, "w2": w2, "h": h, "over": json.dumps(finding.over), "left": ", ".join(finding.left),
         "shapes": ", ".join(finding.shapes), "refused": json.dumps([[r.effects, _plain(r.error), r.reason] for r in finding.refused]),
-        "theta": json.dumps(theta), "reason": "",
+        "follows": told.follows if told else "", "formulas": json.dumps(told.formulas if told else []), "theta": json.dumps(theta),
+        "reason": "",
     }  # fmt: skip
+
+
+class Told(NamedTuple):
+    """What a residual looks like: follows, in words; formulas: the two best, in words."""
+
+    follows: str
+    formulas: list[str]
 
 
 def unjudged(axis: str, subject: str, sizes: tuple[int, int], reason: str) -> Row:
     """Row of `judged` where nothing can be said."""
     numbers: Row = dict.fromkeys(("base", "final", "floor", "w2", "h"), float("nan"))
-    texts: Row = {"over": "{}", "left": "", "shapes": "", "refused": "[]", "theta": "{}", "reason": reason}
+    texts: Row = {"over": "{}", "left": "", "shapes": "", "refused": "[]", "follows": "", "formulas": "[]", "theta": "{}", "reason": reason}
     return {"axis": axis, "subject": subject, "trials": sizes[0], "pieces": sizes[1], **numbers, **texts}
 
 
@@ -118,11 +126,22 @@ def _separate(missing: Sequence[Row], effects: Mapping[str, Effect]) -> Iterator
 def describe(about: pd.Series) -> str:
     """Where something is left and what it looks like, without a cause."""
     over = json.loads(about["over"])
-    places = [k for k in str(about["left"]).split(", ") if k] or [max((k for k in over if k in WHERE), key=lambda k: over[k])]
-    where = " and ".join(f"{WHERE[k]}, {over[k]:.1f} times what noise and a model's usual faults give" for k in places if k in WHERE)
-    shapes = [SHAPES[k].title for k in str(about["shapes"]).split(", ") if k]
-    like = f"; it looks like {', and '.join(shapes)}" if shapes else ""
-    return f"in {where}{like}; no listed effect explains it"
+    shapes = [k for k in str(about["shapes"]).split(", ") if k]
+    places = [k for k in str(about["left"]).split(", ") if k] or [place(shapes, over)]
+    size = {k: f", {over[k]:.1f} times what noise and a model's usual faults give" for k in places if k in str(about["left"])}
+    where = " and ".join(f"{WHERE[k]}{size.get(k, '')}" for k in places if k in WHERE)
+    formulas = [f.removeprefix("a term like ").removesuffix(", no known effect") for f in json.loads(about["formulas"])]
+    like = "; a term like " + ", or like ".join(formulas) if formulas else ""
+    like = like or (f"; it looks like {', and '.join(SHAPES[k].title for k in shapes)}" if shapes else "")
+    follows = f"; {about['follows']}" if about["follows"] else ""
+    return f"in {where}{follows}{like}; no listed effect explains it"
+
+
+def place(shapes: Sequence[str], over: Mapping[str, float]) -> str:
+    """Equation in which shapes stand: a force shows on the kinematic side first."""
+    if "moment" not in over:
+        return "whole"
+    return "kinematic" if any(SHAPES[k].force is not None for k in shapes) else "moment"
 
 
 def reason(about: pd.Series, missing: Sequence[Row]) -> str:

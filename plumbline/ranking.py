@@ -204,7 +204,8 @@ def _finding(
     over, left = _over(case, members), _left(case, members)
     shapes = tuple(n for n in members if n in SHAPES and n not in BESIDE)
     if left or shapes:  # what nobody explains may look like any effect a little
-        doubtful = [n for n in named if needs[n].fall < PLAIN]
+        most = max(o * u for o, u, w in zip(over.values(), case.usual * case.as_zmp, case.weight, strict=True) if w > 0)
+        doubtful = [n for n in named if needs[n].fall < PLAIN or needs[n].share * case.usual[-1] < most]
         refused = [*refused, *(Refused((n,), float("nan"), "small beside what nobody explains") for n in doubtful)]
         named = [n for n in named if n not in doubtful]
     whole = len(case.equations) - 1

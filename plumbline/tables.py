@@ -362,6 +362,8 @@ TABLES: dict[str, list[Column]] = {
         _c("left", "str", "", "equations in which more is left, joined by ', '"),
         _c("shapes", "str", "", "shapes without a cause that the residual needs, joined by ', '"),
         _c("refused", "str", "", "JSON: impostors, list of [effects, error in m, reason]"),
+        _c("follows", "str", "", "what the residual that is left follows, in words; empty where nothing is left"),
+        _c("formulas", "str", "", "JSON: the two best formulas of that residual, in words; no known effect"),
         _c("theta", "str", "", "JSON: effect or base column -> coefficients of the last model; empty where pooled"),
         _c("reason", "str", "", "why nothing is said; empty where it is"),
     ],
