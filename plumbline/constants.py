@@ -12,6 +12,7 @@ from plumbline.physics import G
 LEAST = 0.0003  # [m] a constant below it is nobody's business
 FLOORS = 1.5  # [1] noise floors, the same
 UNKNOWN = 0.001  # [m] the same where the floor is not known
+CLEAR = 0.5  # [1] of what is left beside it
 SURE = 4.0  # [1] standard errors
 LEANING = 0.2  # [1] of a tilt's constant that may stand on the moment side too: the body leans with it
 FOOT = 0.002  # [m] by which a person stands on the one side of both feet
@@ -53,15 +54,17 @@ def constants(case: Case, members: Set, feet: Sequence[Sequence[float]]) -> list
         return []
     noise = float(case.floor[-1])
     least = max(LEAST, FLOORS * noise) if np.isfinite(noise) else UNKNOWN
+    clear = CLEAR if np.isfinite(noise) else 1.0
     out = []
+    rest = dict(zip(case.equations, np.sqrt(case.inside(members)), strict=True))
     level = _level(case, members, "=kinematic") if decisive(case.sums[0])[0] and len(case.equations) > 1 else None
     w2 = float(np.mean([s.w2 for s in case.sums]))
-    if level and level.rms / w2 > least and abs(level.mean) > SURE * level.error:
+    if level and level.rms / w2 > least and abs(level.mean) > SURE * level.error and level.rms > clear * rest["kinematic"]:
         value = (level.mean / G, (level.mean - 2 * level.error) / G, (level.mean + 2 * level.error) / G)
         out.append(Constant("tilt", ("tilt",), {"angle": value}, ("=kinematic",), level.rms / w2, level.p))
         least += LEANING * level.rms / w2
     level = _level(case, members, "=moment")
-    if level.rms > least and level.rms > SURE * level.error:
+    if level.rms > least and level.rms > SURE * level.error and level.rms > clear * rest.get("moment", rest["whole"]):
         out.append(_moment(level, feet, alone=len(case.equations) == 1))
     return out
 

@@ -58,17 +58,16 @@ class Case:
         always = [k for k in self.settled if k != without and not self.twins[k] & set(names)]
         return s.of((*always, *names))
 
-    def errors(self, sets: Sequence[Set], *, without: str = "", silent: Set = ()) -> list[Array]:
+    def left_out(self, names: Set, silent: Set) -> float:
+        """Held-out error of the last equation [m] with some effects and nothing else beside the base.  silent: fitted and not used."""
+        return float(np.sqrt(self.variance([heldout(s, self.weight, [s.of(names)], silent=own(s, *silent)) for s in self.sums])[0, -1]))
+
+    def errors(self, sets: Sequence[Set], *, without: str = "") -> list[Array]:
         """Sum of squares on trials left out of each subject: (S, E, C).
 
-        without: what is not fitted this time.  silent: columns that are fitted and not used.
+        without: what is not fitted this time.
         """
-        return [heldout(s, self.weight, [self.columns(s, names, without) for names in sets], silent=own(s, *silent)) for s in self.sums]
-
-    def paper(self) -> float:
-        """Held-out error of the paper's equation [m]: w2 fitted with a constant beside it, the residual taken without the constant."""
-        silent = ("=moment", "=kinematic")
-        return float(np.sqrt(self.variance([heldout(s, self.weight, [s.of(())], silent=own(s, *silent)) for s in self.sums])[0, -1]))
+        return [heldout(s, self.weight, [self.columns(s, names, without) for names in sets]) for s in self.sums]
 
     def with_and_without(self, names: Set, name: str) -> list[Array]:
         """The same for a model and for what is left of it without one of its effects, (2, E, C)."""

@@ -60,7 +60,7 @@ def candidates(axis: str, subject: str, finding: Finding, effects: Mapping[str, 
 
 def _found(one: Found, candidate: Candidate, effects: Mapping[str, Effect]) -> Row:
     units = {p.name: p.unit for p in effects[one.effect].parameters} if one.effect else {}
-    parameters = {k: {"value": v[0], "unit": units.get(k, ""), "ci95": [v[1], v[2]]} for k, v in one.parameters.items()}
+    parameters = {k: {"value": v[0], "unit": units.get(k, ""), "ci95": [_plain(v[1]), _plain(v[2])]} for k, v in one.parameters.items()}
     return _tried(candidate) | {
         "status": "found", "family": ", ".join(one.family), "before": one.before, "after": one.after, "q": one.q,
         "parameters": json.dumps(parameters),

@@ -152,10 +152,10 @@ def only(w: Weak, chosen: Mask) -> Weak:
 def line(windows: Sequence[Weak], contact: Contact, rest: Sequence[Array], h: float, without: int = -1) -> Line:
     """Line of action of a contact.
 
-    rest: what the model without it leaves of the moment equation, of each trial [m].  h: lever per acceleration [s2].  without: trial.
+    rest: what the model without it leaves of the moment equation, of each trial [m].  h: lever per acceleration [s2].  without: piece.
     """
     a, y, loud = _columns(windows, contact, rest)
-    loud = loud & (np.repeat(np.arange(len(windows)), [len(w.time) for w in windows]) != without)
+    loud = loud & (pieces(windows, contact) != without)
     if not loud.any():
         return Line(*[float("nan")] * 4)
     theta, *_ = np.linalg.lstsq(a[loud], y[loud], rcond=None)
@@ -163,22 +163,40 @@ def line(windows: Sequence[Weak], contact: Contact, rest: Sequence[Array], h: fl
     names = iter(theta)
     height = G * (h - next(names)) if contact.lateral else float("nan")
     x = float(next(names)) if contact.vertical else float("nan")
-    # a mean that the ramps at both ends hardly lower
-    force = float(load @ load / load.sum()) if contact.vertical else float("nan")
-    return Line(force, x, float(pull @ pull / pull.sum()) if contact.lateral else float("nan"), float(height))
+    force = _plateau(load) if contact.vertical else float("nan")
+    return Line(force, x, _plateau(pull) if contact.lateral else float("nan"), float(height))
+
+
+def _plateau(values: Array) -> float:
+    """Mean of a force while it acts in full: where it is more than half of the most."""
+    return float(np.mean(values[np.abs(values) > np.quantile(np.abs(values), 0.95) / 2]))
 
 
 def explained(windows: Sequence[Weak], contact: Contact, rest: Sequence[Array]) -> list[Array]:
-    """What is left of `rest` once the contact is in, its line told from the other trials; of each trial [m]."""
+    """What is left of `rest` once the contact is in, its line told from the other pieces; of each trial [m]."""
     a, y, loud = _columns(windows, contact, rest)
-    trial = np.repeat(np.arange(len(windows)), [len(w.time) for w in windows])
+    piece = pieces(windows, contact)
     out = np.concatenate(list(rest))
-    for k in range(len(windows)):
-        others, mine = loud & (trial != k), loud & (trial == k)
+    for k in np.unique(piece):
+        others, mine = loud & (piece != k), loud & (piece == k)
         if others.sum() > a.shape[1] and mine.any():
             theta, *_ = np.linalg.lstsq(a[others], y[others], rcond=None)
             out[mine] = y[mine] - a[mine] @ theta
-    return [out[trial == k] for k in range(len(windows))]
+    return split(out, windows)
+
+
+def split(values: Array, windows: Sequence[Weak]) -> list[Array]:
+    """Values of all windows, trial by trial."""
+    return np.split(values, np.cumsum([len(w.time) for w in windows])[:-1])
+
+
+def pieces(windows: Sequence[Weak], contact: Contact) -> NDArray[np.int64]:
+    """What is left out together, for each window: trials; pieces of them where the contact acts in fewer than three."""
+    trial = np.repeat(np.arange(len(windows)), [len(w.time) for w in windows])
+    if sum(m.any() for m in contact.loud) >= 3:
+        return trial
+    cluster = np.concatenate([w.cluster for w in windows])
+    return np.asarray(np.unique(np.column_stack([trial, cluster]), axis=0, return_inverse=True)[1].ravel())
 
 
 def _columns(windows: Sequence[Weak], contact: Contact, rest: Sequence[Array]) -> tuple[Array, Array, Mask]:

@@ -164,8 +164,9 @@ def _with_contact(
         told = outer.explained(ws, contact, rest["whole"])
         after += told
         lines.append(outer.line(ws, contact, rest["moment"], lever))
-        each = [outer.line(ws, contact, rest["moment"], lever, without=k) for k in range(len(ws))]
-        spread.append(np.sqrt((len(each) - 1) * np.var(each, axis=0)))  # jackknife by trial
+        piece = np.unique(outer.pieces(ws, contact)[np.concatenate(contact.loud)])
+        each = [outer.line(ws, contact, rest["moment"], lever, without=int(k)) for k in piece]
+        spread.append(np.sqrt((len(each) - 1) * np.var(each, axis=0)))  # jackknife
         gains += [
             np.log(np.mean(a[m] ** 2) / np.mean(b[m] ** 2)) for a, b, m in zip(rest["whole"], told, contact.loud, strict=True) if m.any()
         ]
@@ -211,7 +212,8 @@ def _finding(
     whole = len(case.equations) - 1
     kept = [] if left or shapes else constants(case, members, [[w.feet for w in ws] for ws in windows])
     silent = tuple({"=moment", "=kinematic"} - {c for one in kept for c in one.columns})
-    final = float(np.sqrt(case.variance(case.errors([members], silent=() if case.placed(members) else silent))[0, whole]))
+    final = case.left_out((*members, *named), () if case.placed(members) else silent)
+    base = case.left_out((), ("=moment", "=kinematic"))
     found = [_found(case, members, n, needs[n], final) for n in named]
     for one in kept:
         found = _with_constant(found, one.effect, one.family, one.parameters, final, one.size, one.p)
@@ -220,7 +222,7 @@ def _finding(
     tried = _candidates(case, members, found, needs, refused, absorbed, lacking)
     q = {c.effect: c.q for c in tried}
     found = [replace(f, q=q.get(f.effect, f.p)) for f in found]
-    return Finding(found, shapes, refused, tried, lacking, case.paper(), final, float(case.floor[whole]), over, left, theta)
+    return Finding(found, shapes, refused, tried, lacking, base, final, float(case.floor[whole]), over, left, theta)
 
 
 def motion(windows: Sequence[Sequence[Weak]], equations: Sequence[str]) -> Array:

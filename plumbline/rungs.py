@@ -180,7 +180,7 @@ class _Bench:
             if effect.settled and effect.undo:
                 c = effect.undo(c, here)
                 continue
-            shift = shift + h * (effect.columns(replace(c, w2=1 / h)) @ here)
+            shift = shift - h * (effect.columns(replace(c, w2=1 / h)) @ here)
         zmp = np.where(np.isfinite(motion.plant.p), c.zmp_x, np.nan) + shift
         plant = replace(motion.plant, p=np.where(np.isfinite(zmp), zmp, p))
         free = free_runs(plant, 1.0 / h)
