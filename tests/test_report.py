@@ -439,7 +439,7 @@ def test_views_share_one_source(made: Tables) -> None:
     assert list(documents) == ["lateral", "forward"]
     for axis, document in documents.items():
         assert len(named(document, "ColumnDataSource")) == 1
-        assert len(named(document, "GlyphRenderer")) == 6
+        assert len(named(document, "GlyphRenderer")) == 7
         assert len(named(document, "BoxSelectTool")) >= 3
         assert [r["id"] for r in document["roots"]] == [r[0] for r in view.roots[axis]]
 

@@ -39,7 +39,7 @@ def browser() -> str:
 
 @pytest.fixture(scope="module")
 def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    made = made_tables.study(trials=3)
+    made = made_report.criticised(made_tables.study(trials=3))
     results = made_report.drawn(made, tmp_path_factory.mktemp("study") / "results")
     file = results / "report.html"
     file.write_text(made_report.page(made, results).replace("</body>", PROBE), encoding="utf-8")
@@ -58,7 +58,7 @@ def test_draws_alone(browser: str, page: Path, width: int) -> None:
     done = run(browser, page, f"--window-size={width},1000", "--dump-dom")
     probe = re.search(r"<title>PROBE ([^<]*)</title>", done.stdout)
     assert probe, done.stderr[-2000:]
-    assert probe.group(1) == "1 5 true 0 true true"
+    assert probe.group(1) == "1 8 true 0 true true"
 
 
 def test_no_complaint(browser: str, page: Path) -> None:

@@ -24,10 +24,23 @@ FILES = (
     ("heldout", "heldout/", "errors of each trial with the model found without it"),
     ("residuals", "residuals/", "measured, modelled and what is left, frame by frame"),
     ("where", "where/", "the error in bins of phase plane, time, trial and frequency"),
+    ("judged, candidates", "judged/ candidates/", "what the data say is missing; what became of every effect of the catalogue"),
+    ("rungs, contributions", "rungs/ contributions/", "errors of each model, trial by trial; what each effect adds, window by window"),
     ("ladder", "ladder.parquet", "held-out error of each model, pooled and by group"),
     ("exclusions", "exclusions.parquet", "files that could not be used"),
     ("verdict", "verdict.json", "the result for other programs"),
 )
+
+STATUS = {
+    "found": "missing",
+    "alike": "cannot be told from another",
+    "refused": "refused",
+    "settled": "there, too small for a name",
+    "idle": "brings nothing",
+    "absorbed": "leaves no trace here",
+    "lacking": "cannot be judged",
+}
+"""What became of a candidate, in the order shown."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +145,12 @@ def spaced(value: str) -> str:
     return text(value).replace("_", " ")
 
 
-WORDS = (text, noted, cell, joined, kind, spaced, sign)
+def status(value: str) -> str:
+    """What became of a candidate."""
+    return STATUS.get(value, value)
+
+
+WORDS = (text, noted, cell, joined, kind, spaced, sign, status)
 
 
 # -- the tables -------------------------------------------------------------------------------------------------------
