@@ -38,6 +38,8 @@ def page(made: dict[str, Any], results: Path | None = None, study: str = "made s
 # -- what is missing --------------------------------------------------------------------------------------------------
 
 FACTOR = 10.0
+CANDIDATES = ["axis", "subject", "effect", "status", "family", "before", "after", "fall_low", "fall_high", "q", "vif", "trials_80"]
+CANDIDATES += ["parameters", "reason"]
 KINDS = ("clean", "found", "family", "unexplained", "unjudged")
 
 
@@ -47,14 +49,15 @@ def criticised(made: dict[str, Any], kind: str = "found") -> dict[str, Any]:
     The residuals get a wave of 5 mm; where ang_mom is found, that is what it contributes.
     """
     out = {**made, "verdict": {**made["verdict"], "model": ["ang_mom"] if kind == "found" else []}}
-    if kind != "clean":
+    if kind not in ("clean", "unjudged"):
         wave = 5e-3 * np.sin(2.5 * made["residuals"]["time"])
         moved = {k: made["residuals"][k] + wave for k in ("error", "zmp_model")}
         out["residuals"] = made["residuals"].assign(**moved)
     out["contributions"] = _contributions(out["residuals"], made["residuals"], kind)
-    out["candidates"] = pd.DataFrame([r | {"axis": a} for a in ("lateral", "forward") for r in _candidates(kind)])
+    rows = [r | {"axis": a} for a in ("lateral", "forward") for r in _candidates(kind if a == "lateral" or kind == "unjudged" else "")]
+    out["candidates"] = pd.DataFrame(rows, columns=CANDIDATES)
     out["ladder"] = _ladder(made["ladder"], kind)
-    by_axis = {a: _blocks(b, kind if a == "lateral" else "forward") for a, b in made["verdict"]["by_axis"].items()}
+    by_axis = {a: _blocks(b, kind if a == "lateral" or kind == "unjudged" else "forward") for a, b in made["verdict"]["by_axis"].items()}
     by_subject = {k: _blocks(b, kind) for k, b in made["verdict"]["by_subject"].items()}
     out["verdict"] |= {**by_axis["lateral"], "by_axis": by_axis, "by_subject": by_subject}
     return out
@@ -65,7 +68,7 @@ def _contributions(after: pd.DataFrame, before: pd.DataFrame, kind: str) -> pd.D
     wave = after["error"] - before["error"]
     more = {"after + ang_mom": before["error"], "effect ang_mom": wave} if kind == "found" else {}
     table = after[keys].assign(before=after["error"], **more, **{"effect gain": 0.2 * before["error"]})
-    return table[table["frame"] % 5 == 0].dropna(subset=["before"])
+    return table[table["frame"] % 5 == 0].dropna(subset=["before"]).iloc[: 0 if kind == "unjudged" else None]
 
 
 def _candidates(kind: str) -> list[dict[str, Any]]:
@@ -83,16 +86,17 @@ def _candidates(kind: str) -> list[dict[str, Any]]:
         rows.append({"effect": "ang_mom", "status": "found", **sure, "family": "ang_mom"})
     if kind == "family":
         rows.append({"effect": "", "status": "found", **sure, "family": "offset, com_bias"})
-    return [blank | r for r in rows]
+    return [blank | r for r in rows] if kind != "unjudged" else []
 
 
 def _ladder(clean: pd.DataFrame, kind: str) -> pd.DataFrame:
     """Where something is missing, the base is ten times as far off; where it is found, one rung helps and the next does not."""
     errors = ["error_mm", "ci_low_mm", "ci_high_mm"]
-    base = clean.assign(**{k: FACTOR * clean[k] for k in errors}) if kind not in ("clean", "unjudged") else clean
+    worse = FACTOR if kind not in ("clean", "unjudged") else 1.0
+    base = clean.assign(**{k: clean[k].where(clean["axis"] != "lateral", worse * clean[k]) for k in errors})
     if kind != "found":
         return base
-    first = clean.assign(model="+ ang_mom", effects="ang_mom")
+    first = clean[clean["axis"] == "lateral"].assign(model="+ ang_mom", effects="ang_mom")
     second = first.assign(model="+ gain", effects="ang_mom, gain", error_mm=0.99 * first["error_mm"])
     return pd.concat([base, first, second], ignore_index=True)
 

@@ -17,7 +17,7 @@ ABREAST = 4  # of them in a row
 ROW = 0.24  # [in] of a rung
 NAME = 26  # letters of a rung's name
 SHARE = 0.25  # [1] of the noise floor that a rung must bring
-BASE = "the paper's equation"
+BASE = {"plant": "the paper's equation", "control": "the paper's law"}
 BEHIND = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
 LABELS = {"weak": "held-out error, as ZMP [mm]", "free_run": "free-run error of the CoM [mm]"}
 CONTROL = "output error of the CoM [mm]"
@@ -93,15 +93,20 @@ def _of(plant: pd.DataFrame, column: str, value: str) -> pd.DataFrame:
 # -- panels -----------------------------------------------------------------------------------------------------------
 
 
+def _abreast(groups: Sequence[Any]) -> int:
+    """Small panels in a row: two where there are no more."""
+    return 2 if len(groups) <= 2 else ABREAST
+
+
 def _height(groups: Sequence[Any], count: int) -> float:
-    lines = -(-len(groups) // ABREAST)
+    lines = -(-len(groups) // _abreast(groups))
     return lines * (0.45 + ROW * count) + 0.45 if groups else 0.0
 
 
 def _plant(figure: FigureBase, plant: pd.DataFrame) -> None:
     """The pooled rungs of both axes, weak above and free run below; an axis has rungs of its own."""
     pooled = _of(plant, "all", "all")
-    panels = figure.subplots(2, 2, sharey="col")
+    panels = figure.subplots(2, 2)
     for j, axis in enumerate(s.LETTER):
         mine = pooled[pooled["axis"] == axis]
         for i, (kind, label) in enumerate(LABELS.items()):
@@ -126,7 +131,7 @@ def _small(figure: FigureBase, plant: pd.DataFrame, groups: Sequence[tuple[str, 
     axis = next(a for a in s.LETTER if (plant["axis"] == a).any())
     weak = plant[(plant["kind"] == "weak") & (plant["axis"] == axis)]
     names = _models(weak)
-    panels = figure.subplots(-(-len(groups) // ABREAST), ABREAST, sharex=True, sharey=True, squeeze=False)
+    panels = figure.subplots(-(-len(groups) // _abreast(groups)), _abreast(groups), sharex=True, sharey=True, squeeze=False)
     for axes, (column, value) in zip(panels.flat, groups, strict=False):
         mine = _of(weak, column, value)
         axes.set_title(s.plain(f"{mine['subject'].nunique()} subjects" if value == "*" else value), fontsize=7.5)
@@ -211,11 +216,12 @@ def _models(table: pd.DataFrame) -> list[str]:
 def _labels(table: pd.DataFrame, names: Sequence[str]) -> list[str]:
     """What stands beside each rung: its name, and its effects where the name does not say them."""
     effects = dict(zip(table["model"], table["effects"], strict=True))
+    base = BASE[table["ledger"].iloc[0]]
     out = []
     for name in names:
         added = str(effects.get(name, ""))
         told = not added or name.startswith("+") or set(added.split(", ")) == {name}
-        said = BASE if name == "base" else name if told else f"{name}: {added}"
+        said = base if name == "base" else name if told else f"{name}: {added}"
         out.append(s.plain(said if len(said) <= NAME else f"{said[: NAME - 1].rstrip(' ,:')}\u2026"))
     return out
 

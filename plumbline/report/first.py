@@ -64,7 +64,7 @@ def control(verdict: Mapping[str, Any], effects: Mapping[str, Effect], auto: boo
     for name in AXES:
         block = verdict["by_axis"][name]["control"]
         if name == "lateral" or block["missing"] is not None:
-            said = ledger(block, effects, auto)
+            said = ledger(block, effects, auto, "loci")
             final = number(block["final_error_mm"]) if said.items else ""
             out.append(Control(name, number(block["base_error_mm"]), number(block["noise_floor_mm"]), final, block["reason"], said))
     return out

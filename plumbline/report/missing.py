@@ -39,16 +39,18 @@ class Ledger(NamedTuple):
     cannot: list[tuple[str, str]]
 
 
-def ledger(block: Block, effects: Effects, auto: bool) -> Ledger:
+def ledger(block: Block, effects: Effects, auto: bool, judged: str = "trials") -> Ledger:
     """A block of the verdict in words.
 
     block: `plant` or `control` of one axis.  effects: the catalogue, for titles and what physics says.  auto: models climb by themselves.
+    judged: what was left out, trials or loci.
     """
     missing: Sequence[Block] = block["missing"] or []
     cannot = [(name, why) for name, why in sorted((block.get("cannot_judge") or {}).items())]
     tone = _tone(block)
     return Ledger(
-        tone, _head(tone, missing, effects), _text(tone, block, len(cannot)), [_item(m, missing, effects, auto) for m in missing],
+        tone, _head(tone, missing, effects, bool(block["noise_floor_mm"])), _text(tone, block, len(cannot), judged),
+        [_item(m, missing, effects, auto) for m in missing],
         list(block.get("separate") or []), [] if auto else [f"plumbline add {m['effect']}" for m in missing if _to_add(m)],
         [_refused(r) for r in block.get("refused") or []], cannot,
     )  # fmt: skip
@@ -64,7 +66,8 @@ def _to_add(entry: Block) -> bool:
     return bool(entry["effect"]) and not entry["in_model"]
 
 
-def _head(tone: str, missing: Sequence[Block], effects: Effects) -> str:
+def _head(tone: str, missing: Sequence[Block], effects: Effects, sure: bool) -> str:
+    """The verdict in a few words.  sure: the noise floor is known, so nothing is a claim."""
     names = " and ".join(_name(m, effects) for m in missing)
     if tone == "unexplained":
         return (
@@ -72,14 +75,13 @@ def _head(tone: str, missing: Sequence[Block], effects: Effects) -> str:
             if names
             else "Something is missing that no listed effect explains"
         )
-    return {"unjudged": "Not judged", "none": "Nothing is missing", "missing": f"Missing: {names}"}[tone]
+    nothing = "Nothing is missing" if sure else "Nothing was found to be missing"
+    return {"unjudged": "Not judged", "none": nothing, "missing": f"Missing: {names}"}[tone]
 
 
 def _name(entry: Block, effects: Effects) -> str:
     """The effect in words; where only the family can be told, its members."""
-    if entry["effect"]:
-        return titled(entry["effect"], effects)
-    return f"one of {listed(entry['family'], 'or')}"
+    return titled(entry["effect"], effects) if entry["effect"] else listed(entry["family"], "or")
 
 
 def titled(effect: str, effects: Effects) -> str:
@@ -92,17 +94,16 @@ def listed(names: Sequence[str], word: str) -> str:
     return f" {word} ".join([", ".join(names[:-1]), names[-1]]) if len(names) > 1 else "".join(names)
 
 
-def _text(tone: str, block: Block, cannot: int) -> str:
+def _text(tone: str, block: Block, cannot: int, judged: str) -> str:
     if tone == "unjudged":
         return "Nothing is said of what is missing; that is not to say that nothing is."
     if tone == "unexplained":
         return _left(str(block["description"]))
     if tone == "missing":
         return ""
-    said = "No effect that these data can judge lowers the error on trials left out enough to be named"
-    said += (
-        ", and no structure is left." if block["noise_floor_mm"] else ". The noise floor is not known, so something small may be hidden."
-    )
+    said = f"No effect that these data can judge lowers the error on {judged} left out enough to be named"
+    known = ", and what is left is what noise and a usual body model leave." if judged == "trials" else "."
+    said += known if block["noise_floor_mm"] else ". The noise floor is not known, so something small may be hidden."
     return said + (f" {plural(cannot, 'effect')} could not be judged, see below." if cannot else "")
 
 
@@ -128,11 +129,8 @@ def _item(entry: Block, missing: Sequence[Block], effects: Effects, auto: bool) 
     lines.append(_sure(entry.get("q_value")))
     if effect and entry["in_model"]:
         lines.append("It was added by itself (models: auto)." if auto else "The configured model has it.")
-    return Item(_capital(_name(entry, effects)), [line for line in lines if line])
-
-
-def _capital(words: str) -> str:
-    return words[:1].upper() + words[1:]
+    head = titled(effect, effects) if effect else " or ".join(titled(k, effects) for k in entry["family"])
+    return Item(head, [line for line in lines if line])
 
 
 def _fall(entry: Block, several: bool) -> str:

@@ -20,6 +20,7 @@ SIGNED = ["#4b2a7b", "#7d66a5", "#b9a8d4", "#ddd6e6", "#eeeeee", "#f7d9bd", "#f6
 LETTER = {"lateral": "x", "forward": "y"}
 MOST = 8  # panels of rungs, and of effects
 STRIP = 13  # [px] height of a trial's strip
+LOWEST = 190  # [px] a panel with room for its tools
 LETTERS = 24  # of a trial's name
 
 
@@ -118,7 +119,9 @@ def _strips(source: Any, mapper: Any) -> Any:
     """A strip per trial, coloured as the phase plane."""
     names = list(dict.fromkeys(source.data["trial"]))
     span = {"y_range": models.Range1d(len(names) - 0.4, -0.6)}
-    plot = _plot(source, "Trial by trial, coloured by the error", "time within the trial [s]", "", 95 + STRIP * len(names), **span)
+    plot = _plot(
+        source, "Trial by trial, coloured by the error", "time within the trial [s]", "", max(LOWEST, 95 + STRIP * len(names)), **span
+    )
     plot.yaxis.ticker = models.FixedTicker(ticks=list(range(len(names))))
     plot.yaxis.major_label_overrides = {i: n if len(n) <= LETTERS else f"\u2026{n[1 - LETTERS :]}" for i, n in enumerate(names)}
     plot.yaxis.major_label_text_font_size = "10px"
@@ -138,7 +141,7 @@ def _courses(source: Any, c: str, more: Added, effects: Mapping[str, Effect]) ->
     for key, name in columns(more).items():
         words = said(name, effects)
         after = key.startswith("after")
-        title = f"Error that is left with {words}" if after else f"What {words} adds, in mm of ZMP"
+        title = f"Error that is left with {words}" if after else f"{words}: what it adds, in mm of ZMP"
         span = {"y_range": error.y_range} if after else {}  # on one scale the fall is seen
         plot = _plot(source, title.replace("with + ", "with "), "", "[mm]", 130, x_range=zmp.x_range, **span)
         _dots(plot, source, "t", key, RESIDUAL if after else MODEL)
