@@ -47,7 +47,8 @@ window.addEventListener("load", function () { setTimeout(function () {
       clientX: box.left + at * box.width, clientY: box.top + at * box.height})); }
     send("pointerdown", 0.3); for (var i = 1; i <= 10; i++) { send("pointermove", 0.3 + 0.03 * i); } send("pointerup", 0.6);
     setTimeout(function () {
-      var said = {asked: performance.getEntriesByType("resource").filter(function (r) { return !/^(data|blob|file):/.test(r.name); }).length};
+      var loaded = performance.getEntriesByType("resource");
+      var said = {asked: loaded.filter(function (r) { return !/^(data|blob|file):/.test(r.name); }).length};
       var after = painted();
       said.changed = after.map(function (picture, i) { return picture !== before[i]; });
       said.coloured = [];

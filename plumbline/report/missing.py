@@ -139,7 +139,7 @@ def _fall(entry: Block, several: bool) -> str:
         return ""
     if several:
         return f"With all that is missing the error is {after} mm; without this one it would be {before} mm."
-    return f"With it the error falls from {before} to {after} mm."
+    return f"With it the error falls to {after} mm."
 
 
 def _sure(q: float | None) -> str:

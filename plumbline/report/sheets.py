@@ -24,7 +24,12 @@ FILES = (
     ("heldout", "heldout/", "errors of each trial with the model found without it"),
     ("residuals", "residuals/", "measured, modelled and what is left, frame by frame"),
     ("where", "where/", "the error in bins of phase plane, time, trial and frequency"),
-    ("judged, candidates", "judged/ candidates/", "what the data say is missing; what became of every effect of the catalogue"),
+    (
+        "judged, candidates",
+        "judged.parquet candidates.parquet",
+        "what is missing, what became of every effect; by subject in judged/ candidates/",
+    ),
+    ("control", "control/", "errors of the simulated controller on loci left out, with each candidate"),
     ("rungs, contributions", "rungs/ contributions/", "errors of each model, trial by trial; what each effect adds, window by window"),
     ("ladder", "ladder.parquet", "held-out error of each model, pooled and by group"),
     ("exclusions", "exclusions.parquet", "files that could not be used"),

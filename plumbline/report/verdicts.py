@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from plumbline.effects import Effect
@@ -12,12 +13,17 @@ from plumbline.report.sheets import STATUS, Sheet, Show, decimals, joined, sheet
 from plumbline.report.words import number, plural
 
 MANY_TRIALS = 1000  # more trials than this nobody records
+REFUSED = 0.5  # [1] share of trials in which a law is refused, above which it is said
 INFLATED = 100.0  # [1] variance inflation from which on its size says no more
 
 
 def all_sheets(tables: Mapping[str, pd.DataFrame], verdict: Mapping[str, Any], effects: Mapping[str, Effect]) -> dict[str, Sheet]:
-    """Sheets `candidates` and `subjects`.  tables: candidates, where the stage was run.  effects: the catalogue."""
-    return {"candidates": candidates(tables.get("candidates"), effects), "subjects": subjects(verdict)}
+    """Sheets `candidates`, `laws`, `subjects`.  tables: candidates, control, where those stages were run.  effects: the catalogue."""
+    return {
+        "candidates": candidates(tables.get("candidates"), effects),
+        "laws": laws(tables.get("control"), effects),
+        "subjects": subjects(verdict),
+    }
 
 
 def candidates(table: pd.DataFrame | None, effects: Mapping[str, Effect]) -> Sheet:
@@ -37,13 +43,39 @@ def candidates(table: pd.DataFrame | None, effects: Mapping[str, Effect]) -> She
         "before": ("error without it [mm]", _mm), "after": ("with it [mm]", _mm), "fall": ("fall, 95 % interval [mm]", _as_is),
         "q": ("q", _q), "vif": ("VIF", _vif), "trials_80": ("trials for 80 % power", _trials), "reason": ("why", joined),
     }  # fmt: skip
-    made = sheet(shown, columns, "candidates", empty)
+    made = sheet(shown, columns, "candidates.parquet", empty)
     each = table["subject"].nunique() - 1
     return (
         replace(made, note=f"{made.note} Those of {plural(each, 'single subject')} are in results/candidates.".strip())
         if each > 0
         else made
     )
+
+
+def laws(table: pd.DataFrame | None, effects: Mapping[str, Effect]) -> Sheet:
+    """Every law that was simulated, all subjects together: errors on loci left out, and how much better than the paper's it predicts."""
+    empty = "No law was simulated."
+    if table is None or table.empty:
+        return Sheet([], [], frozenset(), empty=empty)
+    loop = table[(table["mode"] == "loop") & (table["reason"] == "")]
+    sums = loop.groupby("candidate", as_index=False, sort=True)[["frames", "square_sum", "zmp_square_sum", "score"]].sum()
+    base = sums.loc[sums["candidate"] == "", "score"].sum()
+    refused = loop.groupby("candidate")["refused"].mean() > REFUSED
+    shown = sums.assign(
+        com=np.sqrt(sums["square_sum"] / sums["frames"]), zmp=np.sqrt(sums["zmp_square_sum"] / sums["frames"]), gain=base - sums["score"],
+        name=[_law(c, effects) for c in sums["candidate"]],
+        said=["too small, or at a bound" if refused[c] else "" for c in sums["candidate"]],
+    ).sort_values(["gain", "candidate"], ascending=[False, True], kind="stable")  # fmt: skip
+    columns: dict[str, tuple[str, Show]] = {
+        "name": ("effects beside the paper's law", text), "com": ("error of the CoM [mm]", _mm), "zmp": ("error of the ZMP [mm]", _mm),
+        "gain": ("better than the paper's law by", decimals(1)), "said": ("its size", text),
+    }  # fmt: skip
+    return sheet(shown, columns, "control", empty)
+
+
+def _law(candidate: str, effects: Mapping[str, Effect]) -> str:
+    """Effects of a law; one alone with its title."""
+    return f"{candidate}: {effects[candidate].title}" if candidate in effects else candidate.replace("+", ", ") or "none"
 
 
 def _named(row: pd.Series, effects: Mapping[str, Effect]) -> str:
