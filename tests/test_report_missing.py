@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from plumbline.effects import catalogue
-from plumbline.report import linked, verdicts, views
+from plumbline.report import linked, methods, verdicts, views
 from plumbline.report.missing import Ledger, ledger, rate, scaled
 
 Block = dict[str, Any]
@@ -60,6 +60,14 @@ def test_families_are_named_together() -> None:
     assert unnamed.head == "Missing: offset or com_bias"
     assert "cannot tell which of them it is" in said(unnamed)
     assert not unnamed.commands
+
+
+def test_what_to_record_is_taken_from_the_catalogue() -> None:
+    """Where the verdict does not say what tells a family apart, the catalogue does."""
+    one = ledger(block([entry("offset", family=["offset", "com_bias"])]), EFFECTS, auto=True)
+    assert len(one.apart) == 1
+    assert one.apart[0].startswith("offset or com_bias: ")
+    assert EFFECTS["offset"].separated in one.apart[0]
 
 
 def test_several_effects() -> None:
@@ -153,7 +161,7 @@ def test_odd_numbers_of_candidates(found: dict[str, Any]) -> None:
 
 
 def test_laws() -> None:
-    """Every law that was simulated has its errors pooled over loci and its lead over the paper's law, the best on top."""
+    """Every law that was simulated has its errors pooled over loci and its lead over the paper's law; the best that may be is on top."""
     one = {"mode": "loop", "reason": "", "frames": 100, "refused": False}
     rows = [
         {**one, "candidate": "", "square_sum": 4e-4, "zmp_square_sum": 9e-4, "score": 90.0},
@@ -163,8 +171,8 @@ def test_laws() -> None:
     sheet = verdicts.laws(pd.DataFrame(rows), {})
     assert [list(r) for r in sheet.rows] == [
         ["delay", "1.00", "2.00", "40.0", "\u2013"],
-        ["delay, lag", "1.00", "2.00", "39.0", "too small, or at a bound"],
         ["none", "2.00", "3.00", "0.0", "\u2013"],
+        ["delay, lag", "1.00", "2.00", "39.0", "too small, or at a bound"],
     ]
     assert not verdicts.laws(None, {}).rows
 
@@ -201,6 +209,23 @@ def test_panels_are_bounded() -> None:
     """At most so many panels of rungs and of effects, however many there are."""
     more = {f"{kind} {k}": np.zeros(2) for kind in ("after", "effect") for k in range(30)}
     assert len(views.columns(more)) == 2 * views.MOST
+
+
+def test_effects_that_add_most_come_first() -> None:
+    """Rungs stand as they were climbed, effects by what they add."""
+    more = {"effect a": np.array([1.0, np.nan]), "after z": np.ones(2), "effect b": np.array([2.0, -2.0]), "after m": np.ones(2)}
+    assert list(views.columns(more).values()) == ["after z", "after m", "effect b", "effect a"]
+
+
+def test_methods_say_what_was_searched(found: dict[str, Any]) -> None:
+    """The paragraph to paste says how effects were searched for and what was found, in numbers; without a search it does not."""
+    words = " ".join(methods.paragraphs(found, found["verdict"], made_tables.CONFIG))
+    assert "searched for among 4 listed effects" in words
+    assert "Found to be missing: ang_mom (beta = \u22121.05 (95 % interval \u22121.08 to \u22121.02), error with it" in words
+    assert "No listed effect was found to be missing" in words  # forward
+    assert any("Benjamini" in r for r in methods.references(found))
+    plain = made_tables.study(trials=3)
+    assert "searched for" not in " ".join(methods.paragraphs(plain, plain["verdict"], made_tables.CONFIG))
 
 
 # -- the page ---------------------------------------------------------------------------------------------------------

@@ -7,6 +7,7 @@ from typing import Any
 
 import pandas as pd
 
+from plumbline.figures.ladder import earned
 from plumbline.report.words import number, plural
 
 MOST = 200  # rows shown of a table
@@ -232,6 +233,7 @@ def ladder(table: pd.DataFrame) -> Sheet:
         "subject": ("subject", text), "kind": ("error of", kind),
         "model": ("model", text), "effects": ("effects added", text), "error_mm": ("error [mm]", significant),
         "ci_low_mm": ("95 % from", significant), "ci_high_mm": ("to", significant), "noise_floor_mm": ("noise floor [mm]", significant),
+        "earns": ("earns its place", text),
     }  # fmt: skip
-    ordered = table.sort_values("subject", key=lambda v: v != "all", kind="stable")
+    ordered = earned(table).sort_values("subject", key=lambda v: v != "all", kind="stable")
     return sheet(ordered, columns, "ladder.parquet", "No held-out error: no subject has two trials with a CoM and a ZMP.")

@@ -45,11 +45,8 @@ def candidates(table: pd.DataFrame | None, effects: Mapping[str, Effect]) -> She
     }  # fmt: skip
     made = sheet(shown, columns, "candidates.parquet", empty)
     each = table["subject"].nunique() - 1
-    return (
-        replace(made, note=f"{made.note} Those of {plural(each, 'single subject')} are in results/candidates.".strip())
-        if each > 0
-        else made
-    )
+    more = f"Those of {plural(each, 'single subject')} are in results/candidates." if each > 1 else ""
+    return replace(made, note=f"{made.note} {more}".strip())
 
 
 def laws(table: pd.DataFrame | None, effects: Mapping[str, Effect]) -> Sheet:
@@ -65,7 +62,7 @@ def laws(table: pd.DataFrame | None, effects: Mapping[str, Effect]) -> Sheet:
         com=np.sqrt(sums["square_sum"] / sums["frames"]), zmp=np.sqrt(sums["zmp_square_sum"] / sums["frames"]), gain=base - sums["score"],
         name=[_law(c, effects) for c in sums["candidate"]],
         said=["too small, or at a bound" if refused[c] else "" for c in sums["candidate"]],
-    ).sort_values(["gain", "candidate"], ascending=[False, True], kind="stable")  # fmt: skip
+    ).sort_values(["said", "gain", "candidate"], ascending=[True, False, True], kind="stable")  # fmt: skip
     columns: dict[str, tuple[str, Show]] = {
         "name": ("effects beside the paper's law", text), "com": ("error of the CoM [mm]", _mm), "zmp": ("error of the ZMP [mm]", _mm),
         "gain": ("better than the paper's law by", decimals(1)), "said": ("its size", text),

@@ -20,7 +20,6 @@ SIGNED = ["#4b2a7b", "#7d66a5", "#b9a8d4", "#ddd6e6", "#eeeeee", "#f7d9bd", "#f6
 LETTER = {"lateral": "x", "forward": "y"}
 MOST = 8  # panels of rungs, and of effects
 STRIP = 13  # [px] height of a trial's strip
-LOWEST = 190  # [px] a panel with room for its tools
 LETTERS = 24  # of a trial's name
 
 
@@ -41,8 +40,16 @@ def views(points: pd.DataFrame, more: Added, axis: str, effects: Mapping[str, Ef
 
 
 def columns(more: Added) -> dict[str, str]:
-    """Column of the source -> name among what was added."""
-    return {f"{kind}{i}": n for kind in ("after", "effect") for i, n in enumerate([n for n in more if n.startswith(f"{kind} ")][:MOST])}
+    """Column of the source -> name among what was added: rungs as they come, effects by what they add, the most first."""
+    rungs = [n for n in more if n.startswith("after ")]
+    effects = sorted((n for n in more if n.startswith("effect ")), key=lambda n: (-rms(more[n]), n))
+    return {f"{kind}{i}": n for kind, names in (("after", rungs), ("effect", effects)) for i, n in enumerate(names[:MOST])}
+
+
+def rms(values: NDArray[np.float64]) -> float:
+    """Root mean square of what is known; 0 where nothing is."""
+    known = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else 0.0
 
 
 def said(name: str, effects: Mapping[str, Effect]) -> str:
@@ -119,9 +126,8 @@ def _strips(source: Any, mapper: Any) -> Any:
     """A strip per trial, coloured as the phase plane."""
     names = list(dict.fromkeys(source.data["trial"]))
     span = {"y_range": models.Range1d(len(names) - 0.4, -0.6)}
-    plot = _plot(
-        source, "Trial by trial, coloured by the error", "time within the trial [s]", "", max(LOWEST, 95 + STRIP * len(names)), **span
-    )
+    plot = _plot(source, "Trial by trial, coloured by the error", "time within the trial [s]", "", 125 + STRIP * len(names), **span)
+    plot.toolbar_location = "above"  # it may be too low for a column of tools
     plot.yaxis.ticker = models.FixedTicker(ticks=list(range(len(names))))
     plot.yaxis.major_label_overrides = {i: n if len(n) <= LETTERS else f"\u2026{n[1 - LETTERS :]}" for i, n in enumerate(names)}
     plot.yaxis.major_label_text_font_size = "10px"
@@ -141,7 +147,7 @@ def _courses(source: Any, c: str, more: Added, effects: Mapping[str, Effect]) ->
     for key, name in columns(more).items():
         words = said(name, effects)
         after = key.startswith("after")
-        title = f"Error that is left with {words}" if after else f"{words}: what it adds, in mm of ZMP"
+        title = f"Error that is left with {words}" if after else f"{words}: what it adds, in mm of ZMP (rms {1e3 * rms(more[name]):.2g} mm)"
         span = {"y_range": error.y_range} if after else {}  # on one scale the fall is seen
         plot = _plot(source, title.replace("with + ", "with "), "", "[mm]", 130, x_range=zmp.x_range, **span)
         _dots(plot, source, "t", key, RESIDUAL if after else MODEL)
