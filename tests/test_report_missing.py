@@ -161,18 +161,20 @@ def test_odd_numbers_of_candidates(found: dict[str, Any]) -> None:
 
 
 def test_laws() -> None:
-    """Every law that was simulated has its errors pooled over loci and its lead over the paper's law; the best that may be is on top."""
-    one = {"mode": "loop", "reason": "", "frames": 100, "refused": False}
+    """Every law has its errors over loci and its lead over the paper's law on the same ones; what was not refused stands on top."""
+    one = {"subject": "a", "task": "lateral", "condition": "", "trial": "1", "loci": 3}
+    one |= {"mode": "loop", "reason": "", "frames": 100, "refused": False}
     rows = [
         {**one, "candidate": "", "square_sum": 4e-4, "zmp_square_sum": 9e-4, "score": 90.0},
+        {**one, "candidate": "", "square_sum": 4e-4, "zmp_square_sum": 9e-4, "score": 90.0, "trial": "2"},
         {**one, "candidate": "delay", "square_sum": 1e-4, "zmp_square_sum": 4e-4, "score": 50.0},
         {**one, "candidate": "delay+lag", "square_sum": 1e-4, "zmp_square_sum": 4e-4, "score": 51.0, "refused": True},
     ]
     sheet = verdicts.laws(pd.DataFrame(rows), {})
     assert [list(r) for r in sheet.rows] == [
-        ["delay", "1.00", "2.00", "40.0", "\u2013"],
-        ["none", "2.00", "3.00", "0.0", "\u2013"],
-        ["delay, lag", "1.00", "2.00", "39.0", "too small, or at a bound"],
+        ["delay", "3", "1.00", "2.00", "40.0", "\u2013"],
+        ["none", "6", "2.00", "3.00", "0.0", "\u2013"],
+        ["delay, lag", "3", "1.00", "2.00", "39.0", "too small, or at a bound"],
     ]
     assert not verdicts.laws(None, {}).rows
 

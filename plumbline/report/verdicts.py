@@ -9,7 +9,7 @@ import pandas as pd
 
 from plumbline.effects import Effect
 from plumbline.report.missing import rate
-from plumbline.report.sheets import STATUS, Sheet, Show, decimals, joined, sheet, status, text
+from plumbline.report.sheets import STATUS, Sheet, Show, decimals, joined, sheet, status, text, whole
 from plumbline.report.words import number, plural
 
 MANY_TRIALS = 1000  # more trials than this nobody records
@@ -55,16 +55,21 @@ def laws(table: pd.DataFrame | None, effects: Mapping[str, Effect]) -> Sheet:
     if table is None or table.empty:
         return Sheet([], [], frozenset(), empty=empty)
     loop = table[(table["mode"] == "loop") & (table["reason"] == "")]
-    sums = loop.groupby("candidate", as_index=False, sort=True)[["frames", "square_sum", "zmp_square_sum", "score"]].sum()
-    base = sums.loc[sums["candidate"] == "", "score"].sum()
+    key = ["subject", "task", "condition", "trial"]
+    base = loop.loc[loop["candidate"] == "", [*key, "score"]].rename(columns={"score": "paper"})
+    loop = loop.merge(base, on=key)  # a law that was not tried in all is compared where it was
+    added = ["loci", "frames", "square_sum", "zmp_square_sum", "score", "paper"]
+    sums = loop.groupby("candidate", as_index=False, sort=True)[added].sum()
     refused = loop.groupby("candidate")["refused"].mean() > REFUSED
     shown = sums.assign(
-        com=np.sqrt(sums["square_sum"] / sums["frames"]), zmp=np.sqrt(sums["zmp_square_sum"] / sums["frames"]), gain=base - sums["score"],
+        com=np.sqrt(sums["square_sum"] / sums["frames"]), zmp=np.sqrt(sums["zmp_square_sum"] / sums["frames"]),
+        gain=sums["paper"] - sums["score"],
         name=[_law(c, effects) for c in sums["candidate"]],
         said=["too small, or at a bound" if refused[c] else "" for c in sums["candidate"]],
     ).sort_values(["said", "gain", "candidate"], ascending=[True, False, True], kind="stable")  # fmt: skip
     columns: dict[str, tuple[str, Show]] = {
-        "name": ("effects beside the paper's law", text), "com": ("error of the CoM [mm]", _mm), "zmp": ("error of the ZMP [mm]", _mm),
+        "name": ("effects beside the paper's law", text), "loci": ("loci", whole), "com": ("error of the CoM [mm]", _mm),
+        "zmp": ("error of the ZMP [mm]", _mm),
         "gain": ("better than the paper's law by", decimals(1)), "said": ("its size", text),
     }  # fmt: skip
     return sheet(shown, columns, "control", empty)
