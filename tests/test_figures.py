@@ -267,13 +267,13 @@ def test_map_places_bins() -> None:
 
 
 def test_ladder_of_many_subjects() -> None:
-    """More subjects than rows fit share one row with a dot each; nobody is lost."""
+    """More subjects than panels fit share one panel with a dot each; nobody is lost."""
     one = {"ledger": "plant", "axis": "lateral", "task": "all", "condition": "all", "kind": "weak", "model": "base", "effects": ""}
     values = {"ci_low_mm": 0.9, "ci_high_mm": 1.2, "noise_floor_mm": 0.5}
     rows = [{**one, "subject": s, "error_mm": 1.0 + i / 100, **values} for i, s in enumerate(["all", *(f"sub-{k}" for k in range(40))])]
     figure = ladder.draw(pd.DataFrame(rows))
     assert "40 subjects" in texts(figure)
-    assert max(len(ln.get_xdata()) for ln in figure.axes[0].lines) == 40
+    assert max(len(ln.get_xdata()) for axes in figure.axes for ln in axes.lines) == 40
 
 
 def test_floor_and_interval(pushed: Tables) -> None:
@@ -283,7 +283,7 @@ def test_floor_and_interval(pushed: Tables) -> None:
     lines = ladder.draw(table).axes[0].lines
     black = [ln for ln in lines if same_color(ln.get_color(), _style.MEASURED)]
     orange = [ln for ln in lines if same_color(ln.get_color(), _style.RESIDUAL)]
-    assert list(black[0].get_xdata()) == [row["noise_floor_mm"]] * 2
+    assert set(black[0].get_xdata()) == {row["noise_floor_mm"]}
     assert list(orange[0].get_xdata()) == [row["ci_low_mm"], row["ci_high_mm"]]
 
 

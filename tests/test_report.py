@@ -142,7 +142,7 @@ def test_first_screen(made: Tables, page: str) -> None:
     error, low, high, floor = (words.number(row[k]) for k in ("error_mm", "ci_low_mm", "ci_high_mm", "noise_floor_mm"))
     assert f"misses the measured ZMP by {error} mm rms (95 % interval {low} to {high} mm)" in text
     assert f"Sensor noise alone would give {floor} mm" in text
-    assert "not judged yet" in text
+    assert "Not judged" in text
     assert "half width 0.4 s" in text
 
 
@@ -439,7 +439,7 @@ def test_views_share_one_source(made: Tables) -> None:
     assert list(documents) == ["lateral", "forward"]
     for axis, document in documents.items():
         assert len(named(document, "ColumnDataSource")) == 1
-        assert len(named(document, "GlyphRenderer")) == 6
+        assert len(named(document, "GlyphRenderer")) == 7
         assert len(named(document, "BoxSelectTool")) >= 3
         assert [r["id"] for r in document["roots"]] == [r[0] for r in view.roots[axis]]
 

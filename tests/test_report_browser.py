@@ -1,5 +1,7 @@
 """The report in a real browser without a network: it draws, asks nobody, and complains about nothing."""
 
+import html
+import json
 import re
 import shutil
 import subprocess
@@ -28,6 +30,39 @@ window.addEventListener("load", function () { setTimeout(function () {
 }, 1500); });
 </script></body>"""
 
+BRUSH = """<script>
+window.addEventListener("load", function () { setTimeout(function () {
+  function find(root, name) { var out = []; (function walk(n) { n.querySelectorAll("*").forEach(function (e) {
+    if (e.classList.contains(name)) { out.push(e); } if (e.shadowRoot) { walk(e.shadowRoot); } }); })(root); return out; }
+  function painted() { return find(document, "bk-Canvas").map(function (c) {
+    return Array.from((c.shadowRoot || c).querySelectorAll("canvas")).map(function (e) { return e.toDataURL(); }).join(); }); }
+  var choice = document.querySelector("details.views select");
+  choice.value = "after0"; choice.dispatchEvent(new Event("change"));
+  setTimeout(function () {
+    var before = painted(), layer = find(document.getElementById("linked-lateral-phase"), "bk-events")[0];
+    layer.scrollIntoView({block: "center"});
+    var box = layer.getBoundingClientRect();
+    function send(type, at) { layer.dispatchEvent(new PointerEvent(type, {bubbles: true, composed: true, cancelable: true, pointerId: 1,
+      pointerType: "mouse", isPrimary: true, button: type === "pointermove" ? -1 : 0, buttons: type === "pointerup" ? 0 : 1,
+      clientX: box.left + at * box.width, clientY: box.top + at * box.height})); }
+    send("pointerdown", 0.3); for (var i = 1; i <= 10; i++) { send("pointermove", 0.3 + 0.03 * i); } send("pointerup", 0.6);
+    setTimeout(function () {
+      var loaded = performance.getEntriesByType("resource");
+      var said = {asked: loaded.filter(function (r) { return !/^(data|blob|file):/.test(r.name); }).length};
+      var after = painted();
+      said.changed = after.map(function (picture, i) { return picture !== before[i]; });
+      said.coloured = [];
+      Bokeh.documents[0]._all_models.forEach(function (m) {
+        if (m.type === "ColumnDataSource") { said.selected = Array.from(m.selected.indices); said.samples = m.get_length();
+          said.columns = Array.from(m.data.keys ? m.data.keys() : Object.keys(m.data)); }
+        if (m.name === "coloured") { said.coloured.push(m.glyph.fill_color.field); }
+      });
+      document.title = "PROBE" + JSON.stringify(said);
+    }, 1000);
+  }, 800);
+}, 1500); });
+</script></body>"""
+
 
 @pytest.fixture(scope="module")
 def browser() -> str:
@@ -39,10 +74,12 @@ def browser() -> str:
 
 @pytest.fixture(scope="module")
 def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    made = made_tables.study(trials=3)
+    made = made_report.criticised(made_tables.study(trials=3))
     results = made_report.drawn(made, tmp_path_factory.mktemp("study") / "results")
+    text = made_report.page(made, results)
+    (results / "brush.html").write_text(text.replace("</body>", BRUSH), encoding="utf-8")
     file = results / "report.html"
-    file.write_text(made_report.page(made, results).replace("</body>", PROBE), encoding="utf-8")
+    file.write_text(text.replace("</body>", PROBE), encoding="utf-8")
     return file
 
 
@@ -58,7 +95,21 @@ def test_draws_alone(browser: str, page: Path, width: int) -> None:
     done = run(browser, page, f"--window-size={width},1000", "--dump-dom")
     probe = re.search(r"<title>PROBE ([^<]*)</title>", done.stdout)
     assert probe, done.stderr[-2000:]
-    assert probe.group(1) == "1 5 true 0 true true"
+    assert probe.group(1) == "1 9 true 0 true true"
+
+
+def test_brush(browser: str, page: Path) -> None:
+    """A box drawn in the phase plane lights its samples in every view, each rung's error and each effect among them; asks nobody."""
+    done = run(browser, page.with_name("brush.html"), "--window-size=1280,1000", "--dump-dom")
+    probe = re.search(r"<title>PROBE(.*?)</title>", done.stdout)
+    assert probe, done.stderr[-2000:]
+    said = json.loads(html.unescape(probe.group(1)))
+    assert 0.02 < len(said["selected"]) / said["samples"] < 0.6
+    assert {"error", "after0", "effect0", "effect1", "row", "within"} <= set(said["columns"])
+    assert said["changed"] == [True] * 9
+    assert said["coloured"] == ["after0", "after0"]
+    assert said["asked"] == 0
+    assert page.stat().st_size < 20e6
 
 
 def test_no_complaint(browser: str, page: Path) -> None:

@@ -9,7 +9,8 @@ from typing import Any
 import jinja2
 import pandas as pd
 
-from plumbline.report import controller, linked, methods, sheets, words
+from plumbline.effects import Effect, catalogue
+from plumbline.report import controller, first, linked, methods, sheets, verdicts, words
 
 DATA_FILES = ("page.html.j2", "page.css", "../../workflow/report/*.rst")  # the captions are those of the Snakemake report
 
@@ -57,23 +58,29 @@ def page(
     verdict: Mapping[str, Any],
     config: Mapping[str, Any],
     pictures: Sequence[Picture],
+    effects: Mapping[str, Effect] | None = None,
 ) -> str:
     """The whole page as HTML.
 
     study: its name.  tables: trials, coverage, exclusions, loci, pushes, trust, clusters, choice, controller, fit, where, ladder of all
-    parts, residuals of the first.
-    verdict: what results/verdict.json holds.  config: its sections recording, signals, evaluation.  pictures: see :func:`pictures`.
+    parts, residuals of the first; and, where effects were searched for, candidates of the cohort and contributions of the first part.
+    verdict: what results/verdict.json holds.  config: its sections recording, signals, evaluation, models.  pictures: see
+    :func:`pictures`.  effects: the catalogue, without it the library's.
     """
-    view = linked.linked(tables["residuals"], tables["where"], config["evaluation"]["half_width"])
+    known = catalogue() if effects is None else effects
+    auto = config.get("models", "auto") == "auto"
+    view = linked.linked(tables["residuals"], tables["where"], config["evaluation"]["half_width"], tables.get("contributions"), known)
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(HERE), autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
     return environment.get_template("page.html.j2").render(
         study=study,
         css=(HERE / "page.css").read_text(encoding="utf-8"),
-        look=words.look(verdict, tables["ladder"]),
+        look=first.look(verdict, tables["ladder"], known, auto),
+        control=first.control(verdict, known, auto),
+        auto=auto,
         counts=words.counts(tables),
-        sheets=sheets.all_sheets(tables),
+        sheets=sheets.all_sheets(tables) | verdicts.all_sheets(tables, verdict, known),
         controller=controller.section(tables),
         view=view,
         bokeh=linked.javascript() if view.roots else "",

@@ -9,6 +9,7 @@ import pandas as pd
 
 from plumbline import __version__
 from plumbline.report.controller import results
+from plumbline.report.missing import sizes
 from plumbline.report.words import number, plural, pooled
 
 OWN = "markerset"  # name of a marker set that came with the study
@@ -19,6 +20,7 @@ MURAI = (
     "recursive-least-square method. IEEE/RSJ International Conference on Intelligent Robots and Systems."
 )
 LEVA = "de Leva P (1996) Adjustments to Zatsiorsky-Seluyanov's segment inertia parameters. Journal of Biomechanics 29:1223-1230."
+BENJAMINI = "Benjamini Y, Hochberg Y (1995) Controlling the false discovery rate. J. Royal Statistical Society B 57:289-300."
 LIANG = "Liang KY, Zeger SL (1986) Longitudinal data analysis using generalized linear models. Biometrika 73:13-22."
 LJUNG = "Ljung L (1999) System Identification: Theory for the User, 2nd edition. Prentice Hall."
 KING = "King DL, Zatsiorsky VM (1997) Extracting gravity line displacement from stabilographic recordings. Gait & Posture 6:27-38."
@@ -42,7 +44,8 @@ def references(tables: Mapping[str, pd.DataFrame]) -> list[str]:
     used = set(tables["coverage"]["com_method"])
     built_in = set(tables["coverage"].loc[tables["coverage"]["com_method"] == "table", "marker_set"]) - {OWN}
     law = [LJUNG] if len(tables["controller"]) else []
-    return [MURAI, *([LEVA] if built_in else []), *([KING] if "force" in used else []), *law, LIANG, MOELDER]
+    searched = [BENJAMINI] if len(tables.get("candidates", ())) else []
+    return [MURAI, *([LEVA] if built_in else []), *([KING] if "force" in used else []), *law, *searched, LIANG, MOELDER]
 
 
 def paragraphs(tables: Mapping[str, pd.DataFrame], verdict: Mapping[str, Any], config: Mapping[str, Any]) -> list[str]:
@@ -50,6 +53,7 @@ def paragraphs(tables: Mapping[str, pd.DataFrame], verdict: Mapping[str, Any], c
     return [
         " ".join([_recordings(tables, config), _com(tables["coverage"]), _filter(config)]),
         " ".join([_model(config["evaluation"]), _judging(config["evaluation"]), _loci(tables)]),
+        *([_search(tables["candidates"])] if len(tables.get("candidates", ())) else []),
         *([_controller(tables)] if len(tables["controller"]) else []),
         " ".join([*(_result(a, verdict, tables["ladder"]) for a in ("lateral", "forward")), f"Software: {versions()}."]),
     ]
@@ -131,6 +135,17 @@ def _judging(evaluation: Mapping[str, Any]) -> str:
     )
 
 
+def _search(candidates: pd.DataFrame) -> str:
+    count = int((candidates["status"] != "lacking").groupby(candidates["effect"]).any().sum())
+    return (
+        f"What the equation lacks was searched for among {plural(count, 'listed effect')}, alone and in small sets, in the weak form of "
+        "the equation; where the shear force was recorded the kinematic side (x'' against Fx/m) and the moment side were judged apart. An "
+        "effect is named where it predicts trials left out better than chance (tests clustered by trial; false discovery rate "
+        "over the list, Benjamini and Hochberg 1995), by an amount that matters against the noise floor, and with a size and sign that "
+        "are physically possible. Effects that these data cannot tell apart are named together."
+    )
+
+
 def _loci(tables: Mapping[str, pd.DataFrame]) -> str:
     pushes, loci = tables["pushes"], tables["loci"]
     if pushes.empty and loci.empty:
@@ -172,4 +187,11 @@ def _result(axis: str, verdict: Mapping[str, Any], ladder: pd.DataFrame) -> str:
     if rung and rung["ci_low_mm"] == rung["ci_low_mm"]:
         said += f" (95 % interval {number(rung['ci_low_mm'])} to {number(rung['ci_high_mm'])} mm)"
     floor = plant["noise_floor_mm"]
-    return said + (f", the noise floor {number(floor)} mm." if floor else "; the noise floor is not known.")
+    said += f", the noise floor {number(floor)} mm." if floor else "; the noise floor is not known."
+    if plant["missing"] is None:
+        return said
+    names = [f"{m['effect'] or ' or '.join(m['family'])} ({sizes(m)})" for m in plant["missing"]]
+    left = ["structure that no listed effect explains"] if plant["unexplained"] else []
+    if not names and not left:
+        return f"{said} No listed effect was found to be missing."
+    return f"{said} Found to be missing: {', '.join(names + left)}."

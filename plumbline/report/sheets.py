@@ -7,6 +7,7 @@ from typing import Any
 
 import pandas as pd
 
+from plumbline.figures.ladder import earned
 from plumbline.report.words import number, plural
 
 MOST = 200  # rows shown of a table
@@ -24,10 +25,28 @@ FILES = (
     ("heldout", "heldout/", "errors of each trial with the model found without it"),
     ("residuals", "residuals/", "measured, modelled and what is left, frame by frame"),
     ("where", "where/", "the error in bins of phase plane, time, trial and frequency"),
+    (
+        "judged, candidates",
+        "judged.parquet candidates.parquet",
+        "what is missing, what became of every effect; by subject in judged/ candidates/",
+    ),
+    ("control", "control/", "errors of the simulated controller on loci left out, with each candidate"),
+    ("rungs, contributions", "rungs/ contributions/", "errors of each model, trial by trial; what each effect adds, window by window"),
     ("ladder", "ladder.parquet", "held-out error of each model, pooled and by group"),
     ("exclusions", "exclusions.parquet", "files that could not be used"),
     ("verdict", "verdict.json", "the result for other programs"),
 )
+
+STATUS = {
+    "found": "missing",
+    "alike": "cannot be told from another",
+    "refused": "refused",
+    "settled": "there, too small for a name",
+    "idle": "brings nothing",
+    "absorbed": "leaves no trace here",
+    "lacking": "cannot be judged",
+}
+"""What became of a candidate, in the order shown."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +151,12 @@ def spaced(value: str) -> str:
     return text(value).replace("_", " ")
 
 
-WORDS = (text, noted, cell, joined, kind, spaced, sign)
+def status(value: str) -> str:
+    """What became of a candidate."""
+    return STATUS.get(value, value)
+
+
+WORDS = (text, noted, cell, joined, kind, spaced, sign, status)
 
 
 # -- the tables -------------------------------------------------------------------------------------------------------
@@ -209,6 +233,7 @@ def ladder(table: pd.DataFrame) -> Sheet:
         "subject": ("subject", text), "kind": ("error of", kind),
         "model": ("model", text), "effects": ("effects added", text), "error_mm": ("error [mm]", significant),
         "ci_low_mm": ("95 % from", significant), "ci_high_mm": ("to", significant), "noise_floor_mm": ("noise floor [mm]", significant),
+        "earns": ("earns its place", text),
     }  # fmt: skip
-    ordered = table.sort_values("subject", key=lambda v: v != "all", kind="stable")
+    ordered = earned(table).sort_values("subject", key=lambda v: v != "all", kind="stable")
     return sheet(ordered, columns, "ladder.parquet", "No held-out error: no subject has two trials with a CoM and a ZMP.")

@@ -1,26 +1,9 @@
-"""What the first screen says, in words and few numbers."""
+"""Numbers and counts in words."""
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import pandas as pd
-
-AXES = {"lateral": "left and right", "forward": "back and forth"}
-
-
-class Axis(NamedTuple):
-    """What is said of one axis. error, low, high, floor, free_run: [mm] as text, empty where not known."""
-
-    name: str
-    gloss: str
-    error: str
-    low: str
-    high: str
-    floor: str
-    free_run: str
-    sentence: str
-    reason: str
-    missing: str
 
 
 def number(value: float | None, digits: int = 3) -> str:
@@ -30,21 +13,6 @@ def number(value: float | None, digits: int = 3) -> str:
     if abs(value) >= 10**digits:
         return f"{value:.0f}"
     return f"{value:#.{digits}g}".rstrip(".")
-
-
-def look(verdict: Mapping[str, Any], ladder: pd.DataFrame) -> list[Axis]:
-    """One entry per axis."""
-    return [_axis(name, verdict["by_axis"][name]["plant"], ladder) for name in AXES]
-
-
-def _axis(name: str, plant: Mapping[str, Any], ladder: pd.DataFrame) -> Axis:
-    weak, free = (pooled(ladder, name, kind) for kind in ("weak", "free_run"))
-    error, floor = plant["base_error_mm"], plant["noise_floor_mm"]
-    low, high = (number(weak.get(k)) for k in ("ci_low_mm", "ci_high_mm"))
-    return Axis(
-        name, AXES[name], number(error), low, high, number(floor), number(free.get("error_mm")),
-        sentence(error, floor, low, high), plant["reason"], _missing(plant["missing"]),
-    )  # fmt: skip
 
 
 def pooled(ladder: pd.DataFrame, axis: str, kind: str) -> dict[str, Any]:
@@ -69,12 +37,6 @@ def _ratio(ratio: float) -> str:
     if ratio <= 1.25:
         return "the error is within a quarter of that floor"
     return f"the error is {number(ratio, 2)} times that floor"
-
-
-def _missing(missing: list[Mapping[str, Any]] | None) -> str:
-    if missing is None:
-        return "not judged yet"
-    return ", ".join(str(m["effect"] or f"one of {', '.join(m['family'])}") for m in missing) or "nothing found missing"
 
 
 def counts(tables: Mapping[str, pd.DataFrame]) -> str:

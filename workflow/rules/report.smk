@@ -15,6 +15,10 @@ rule report:
         fit=parts("fit"),
         where=parts("where"),
         residuals=parts("residuals")[:1],
+        contributions=parts("contributions")[:1],
+        candidates="results/candidates.parquet",
+        control=parts("control"),
+        effects=EFFECTS,
         figures=expand(
             "results/{stage}/_{part}.svg",
             stage=["signals", "loci", "trust", "clusters", "fit", "residuals"],
@@ -32,7 +36,7 @@ rule report:
         "results/logs/report.log",
     params:
         code=code("report.py"),
-        config={k: config[k] for k in ("recording", "signals", "evaluation")},
+        config={k: config[k] for k in ("recording", "signals", "evaluation", "models")},
         study="demo study" if Path.cwd() == REPO else Path.cwd().name,
         parts=PARTS,
     script:
