@@ -163,7 +163,10 @@ def _taken(finding: Finding, plant: Mapping[str, Effect]) -> dict[str, Array]:
     out = {}
     for name, theta in finding.theta[0].items():
         effect = plant.get(name)
-        if effect is not None and effect.settled and effect.undo and abs(theta[0]) > WORTH * effect.parameters[0].matters:
+        able = effect is not None and effect.settled and effect.undo is not None
+        if effect is None or not able or effect.parameters[0].refusal(float(theta[0])):
+            continue
+        if abs(theta[0]) > WORTH * effect.parameters[0].matters:
             out[name] = theta
     return out
 

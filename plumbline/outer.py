@@ -23,7 +23,7 @@ Mask = NDArray[np.bool_]
 LOUD = 5.0  # [1] times noise and usual faults, from which on something acts
 LOAD = 0.02  # [1] of body weight, the same for what the plates do not carry
 LATERAL = 0.004  # [1] of body weight, the same for a force to the side
-REST = 0.2  # [1] share of windows in which nothing must act
+REST = 0.35  # [1] share of windows in which nothing must act
 ACTS = 0.03  # [1] and in which something must
 SIDE = 0.9  # [1] of its square that must have one sign
 EVEN = 0.02  # [1] by which a force to the side may vary while it acts, beside noise; what carries weight can be nothing else
@@ -62,13 +62,14 @@ def find(windows: Sequence[Weak], faults: float) -> Contact | None:
     """
     if not all(np.isfinite(w.force).all() for w in windows):
         return None
-    side = [_centred(w.acceleration - w.force) for w in windows]
-    down = [_centred(w.vertical) if np.isfinite(w.vertical).all() else np.zeros(len(w.time)) for w in windows]
-    noise = float(np.sqrt(np.nanmean([w.floor("kinematic", 0.1) for w in windows])))
-    noise = noise if np.isfinite(noise) else float(np.median(np.abs(np.concatenate(side))))
+    side = _centred([w.acceleration - w.force for w in windows])
+    upright = all(np.isfinite(w.vertical).all() for w in windows)
+    down = _centred([w.vertical if upright else np.zeros(len(w.time)) for w in windows])
+    known = [w.floor("kinematic", 0.1) for w in windows]
+    noise = float(np.sqrt(np.mean(known))) if np.isfinite(known).all() else float(np.median(np.abs(np.concatenate(side))))
     lateral = _acts(windows, side, max(LOUD * np.hypot(noise, faults), LATERAL * G), float(noise))
-    floor = float(np.sqrt(np.nanmean([w.floor("vertical", 0.1) for w in windows])))
-    vertical = _acts(windows, down, max(LOUD * np.nan_to_num(floor), LOAD * G), np.inf)
+    floor = float(np.sqrt(np.nanmean([np.nan_to_num(w.floor("vertical", 0.1)) for w in windows])))
+    vertical = _acts(windows, down, max(LOUD * floor, LOAD * G), np.inf)
     if lateral is None and vertical is None:
         return None
     loud = tuple(_widened(w, m) for w, m in zip(windows, _either(lateral, vertical, windows), strict=True))
@@ -78,9 +79,10 @@ def find(windows: Sequence[Weak], faults: float) -> Contact | None:
     return Contact(loud, pull, load, lateral is not None, vertical is not None)
 
 
-def _centred(values: Array) -> Array:
-    """Less the value it has most of the time: of the quieter half."""
-    return np.asarray(values - np.median(values))
+def _centred(values: Sequence[Array]) -> list[Array]:
+    """Less what it is most of the time: nothing acts in more than half of the windows, though it may in one trial."""
+    middle = np.median(np.concatenate(list(values)))
+    return [np.asarray(v - middle) for v in values]
 
 
 def _either(a: list[Mask] | None, b: list[Mask] | None, windows: Sequence[Weak]) -> list[Mask]:

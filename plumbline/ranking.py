@@ -23,6 +23,7 @@ FAULT = 0.005  # [1] of the motion that a segment table and rigid segments leave
 LEFT = 1.35  # [1] residual over noise floor and that, above which something is left
 PLAIN = 2.0  # [1] fall of the score that an effect must bring to be named where something is left that nobody explains
 CONTACT = "push"  # found in time, see outer.py
+DROWNED = 4.0  # [1] residual over noise floor and usual faults, above which any name may be its shadow
 LEANS = 1.1  # [1] h times w2 of a person who stands with an upright trunk, to begin with
 SHOWS = 0.6  # [1] of what noise and usual faults leave, by which an effect of any motion must lower the rms to be named
 SAME = 0.1  # [1] share of its fall that a member may lose when another effect takes its place, and the data cannot tell them apart
@@ -206,7 +207,8 @@ def _finding(
     shapes = tuple(n for n in members if n in SHAPES and n not in BESIDE)
     if left or shapes:  # what nobody explains may look like any effect a little
         most = max(o * u for o, u, w in zip(over.values(), case.usual * case.as_zmp, case.weight, strict=True) if w > 0)
-        doubtful = [n for n in named if needs[n].fall < PLAIN or needs[n].share * case.usual[-1] < most]
+        drowned = max(over[e] for e, z in zip(over, case.weight * case.as_zmp, strict=True) if z > 0) > DROWNED
+        doubtful = [n for n in named if drowned or needs[n].fall < PLAIN or needs[n].share * case.usual[-1] < most or not needs[n].lowers]
         refused = [*refused, *(Refused((n,), float("nan"), "small beside what nobody explains") for n in doubtful)]
         named = [n for n in named if n not in doubtful]
     whole = len(case.equations) - 1

@@ -64,7 +64,8 @@ def sums(windows: Sequence[Weak], effects: Sequence[str], w2: float, h: float = 
     """
     h = h or 1.0 / w2
     shear = all(np.isfinite(w.force).all() for w in windows)
-    equations = ("kinematic", "moment", "vertical", "whole") if shear else ("whole",)
+    upright = ("vertical",) if all(np.isfinite(w.vertical).all() for w in windows) else ()
+    equations = ("kinematic", "moment", *upright, "whole") if shear else ("whole",)
     columns = [(name, 0) for name in BASE]
     first = windows[0].terms
     columns += [(name, k) for name in effects for k in range(first[name]["plain"].shape[1])]

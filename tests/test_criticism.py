@@ -1,0 +1,193 @@
+"""The criticism of the plant from windows to verdict: contacts, constants, channels that are absent, too few trials, the ladder's rungs."""
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from made_study import EVALUATION, Result
+
+from plumbline import evidence, rungs
+from plumbline.constants import _Level, _moment
+from plumbline.criticism import of_cohort, of_part, settled
+from plumbline.effects import catalogue
+from plumbline.ladder import Said, ladder, verdict
+from plumbline.ranking import Finding, false_discovery_rate
+from plumbline.simulate.person import draw_subject
+from plumbline.simulate.study import write_study
+
+EFFECTS = catalogue()
+LAB = {"trials": 6, "duration": 10.0, "rate": 100.0, "force_rate": 500.0}
+
+
+@cache
+def disclosed(folder: Path) -> Result:
+    return Result(folder)
+
+
+def made(folder: Path, effects: dict[str, dict[str, float]], seed: int = 21, **laboratory: float) -> Result:
+    """A simulated person with something hidden, written as files and read again."""
+    write_study(folder, [draw_subject("sub-01", seed)], seed=seed, effects=effects, **{**LAB, **laboratory})
+    return Result(folder)
+
+
+def found(result: Result, drop: tuple[str, ...] = ()) -> Finding:
+    """What the lateral axis lacks, some channels deleted."""
+    signals = result.signals.assign(**dict.fromkeys(drop, np.nan))
+    _, finding = settled(signals, result.pushes, result.coverage, EFFECTS, EVALUATION, "lateral")
+    assert finding is not None
+    return finding
+
+
+def names(finding: Finding) -> set[str]:
+    return {f.effect for f in finding.found}
+
+
+# -- contacts beside the plates -----------------------------------------------------------------------------------------
+
+
+def test_a_seat_is_found_by_itself(tmp_path: Path) -> None:
+    """80 N carried 0.4 m to the left for 3 s of each trial: named `push`, its place within 2 cm, its load within a tenth; no other name."""
+    got = found(made(tmp_path, {"push": {"lateral": 0.0, "force": 80.0, "x": -0.4, "duration": 3.0}}))
+    assert names(got) == {"push"}
+    (one,) = got.found
+    assert one.parameters["x"][0] == pytest.approx(-0.4, abs=0.02)
+    assert one.parameters["force"][0] == pytest.approx(80.0, rel=0.1)
+    assert one.after < one.before / 5
+
+
+def test_a_lean_to_the_side_is_found_by_itself(tmp_path: Path) -> None:
+    """18 N to the right at 1.2 m: named `push`, its height within 5 cm."""
+    got = found(made(tmp_path, {"push": {"lateral": 18.0, "height": 1.2, "duration": 3.0}}, seed=22))
+    assert names(got) == {"push"}
+    assert got.found[0].parameters["height"][0] == pytest.approx(1.2, abs=0.05)
+    assert got.found[0].parameters["lateral"][0] == pytest.approx(18.0, rel=0.1)
+
+
+@pytest.mark.parametrize("effect", [{"magnet": {"size": 14.0}}, {"friction": {"size": 9.0}}, {}])
+def test_what_follows_the_body_is_no_contact(tmp_path: Path, effect: dict[str, dict[str, float]]) -> None:
+    """A magnet, something that rubs, and nothing at all: no contact is named; only the first two leave something unexplained."""
+    got = found(made(tmp_path, effect, seed=23))
+    assert "push" not in names(got)
+    assert bool(got.left or got.shapes) == bool(effect)
+
+
+# -- constants ----------------------------------------------------------------------------------------------------------
+
+
+def test_the_feet_tell_a_plate_from_a_com() -> None:
+    """The CoP of both plates moved with the constant: offset. It stayed at the feet: com_bias. Nobody knows: both, and no name."""
+    level = _Level(0.008, 0.0001, 0.008, 1e-6)
+    assert _moment(level, [[-0.008, -0.009, -0.007]], alone=False).family == ("offset",)
+    assert _moment(level, [[0.0, 0.001, -0.001]], alone=False).family == ("com_bias",)
+    unknown = _moment(level, [[float("nan")] * 3], alone=False)
+    assert (unknown.effect, unknown.family) == ("", ("offset", "com_bias"))
+    assert _moment(level, [[float("nan")] * 3], alone=True).family == ("offset", "com_bias", "tilt")
+
+
+def test_a_shift_of_the_plates_is_named_with_its_sign(tmp_path: Path) -> None:
+    """p recorded 9 mm too large: b = 9 mm."""
+    got = found(made(tmp_path, {"offset": {"b": 0.009}}, seed=24))
+    assert [f.family[0] for f in got.found] == ["offset"]
+    assert got.found[0].parameters["b"][0] == pytest.approx(0.009, abs=0.0005)
+
+
+# -- channels -----------------------------------------------------------------------------------------------------------
+
+SEGMENTS = ("ang_mom_x", "ang_mom_y", "ang_mom_z")
+
+
+@pytest.mark.parametrize(
+    ("study", "drop", "lacks", "says"),
+    [
+        ("ang_mom", SEGMENTS, "ang_mom", "ang_mom"),
+        ("sync", ("grf_x", "grf_y"), "hand", "grf_x"),
+        ("height", ("grf_x", "grf_y"), "force_scale", "grf_x"),
+    ],
+)
+def test_what_lacks_its_channel_is_listed_and_never_named(
+    shared_data: Path, study: str, drop: tuple[str, ...], lacks: str, says: str
+) -> None:
+    """Without segments, without shear: the effect that needs them says so and is not named."""
+    got = found(disclosed(shared_data / "hidden_effect" / study), drop)
+    (row,) = [c for c in got.candidates if c.effect == lacks]
+    assert row.status == "lacking"
+    assert "cannot be judged: needs" in row.reason
+    assert says in row.reason
+    assert lacks not in names(got)
+
+
+@pytest.mark.parametrize(("study", "effect"), [("ang_mom", "ang_mom"), ("sync", "sync"), ("height", "height"), ("clean", "")])
+def test_without_shear_what_can_still_be_known_is_named(shared_data: Path, study: str, effect: str) -> None:
+    """Only the whole equation is left: the true effect or a family that holds it, and nothing on clean data."""
+    got = found(disclosed(shared_data / "hidden_effect" / study), ("grf_x", "grf_y"))
+    assert all(effect in f.family for f in got.found)
+    assert bool(got.found) == bool(effect)
+
+
+def test_without_the_vertical_force_the_verdict_stands(shared_data: Path) -> None:
+    """The vertical is a witness; without it the moment side still tells angular momentum."""
+    assert names(found(disclosed(shared_data / "hidden_effect" / "ang_mom"), ("grf_z",))) == {"ang_mom"}
+
+
+# -- verdict and ladder --------------------------------------------------------------------------------------------------
+
+
+def test_windows_survive_the_table(shared_data: Path) -> None:
+    """Windows written as the table `evidence` and read again give the same terms."""
+    got = disclosed(shared_data / "hidden_effect" / "sync")
+    windows, _ = settled(got.signals, got.pushes, got.coverage, EFFECTS, EVALUATION, "lateral")
+    again = list(evidence.from_table(evidence.to_table(windows)))
+    assert [w.trial for w in again] == [w.trial for w in windows]
+    for a, b in zip(windows, again, strict=True):
+        assert set(a.terms) == set(b.terms)
+        assert all(np.array_equal(a.terms[k][part], b.terms[k][part]) for k in a.terms for part in a.terms[k])
+        assert a.centre["sync"] == pytest.approx(b.centre["sync"])
+
+
+def test_one_trial_gives_no_verdict_and_says_what_is_needed(shared_data: Path) -> None:
+    """missing is null, the reason names the number of trials."""
+    got = disclosed(shared_data / "hidden_effect" / "ang_mom")
+    few = got.coverage.head(1)
+    table, alone, tried = of_part(got.signals, got.pushes, few, EFFECTS, EVALUATION)
+    judged, candidates = of_cohort(dict(tuple(table.groupby("subject"))), alone, tried, EFFECTS)
+    said = verdict(Said(ladder(got.heldout), few, got.heldout, judged, candidates), EVALUATION)
+    assert said["plant"]["missing"] is None
+    assert said["plant"]["unexplained"] is None
+    assert "at least 2 trials" in said["plant"]["reason"]
+
+
+def test_each_rung_lowers_the_error_and_the_effect_is_what_lowers_it(shared_data: Path) -> None:
+    """Angular momentum takes nine tenths off the weak error and half off the free run; a wrong effect takes off nothing."""
+    got = disclosed(shared_data / "hidden_effect" / "ang_mom")
+    table, alone, tried = of_part(got.signals, got.pushes, got.coverage, EFFECTS, EVALUATION)
+    judged, candidates = of_cohort(dict(tuple(table.groupby("subject"))), alone, tried, EFFECTS)
+    coverage = got.coverage.assign(files="")
+    models = [("empty", ()), ("wrong", ("drift",)), ("right", ("ang_mom",))]
+    rows, shown = rungs.of_part(got.signals, got.pushes, coverage, table, judged, candidates, EFFECTS, models, EVALUATION)
+    rows = rows[rows["axis"] == "lateral"].groupby("model")[["square_sum", "windows", "free_run_square_sum", "free_run_frames"]].sum()
+    weak = np.sqrt(rows["square_sum"] / rows["windows"])
+    free = np.sqrt(rows["free_run_square_sum"] / rows["free_run_frames"])
+    assert weak["right"] < 0.1 * weak["empty"]
+    assert free["right"] < 0.5 * free["empty"]
+    assert weak["wrong"] > 0.95 * weak["empty"]
+    assert {"before", "after right", "effect ang_mom"} <= set(shown.columns)
+
+
+def test_the_false_discovery_rate_is_the_textbooks() -> None:
+    """Benjamini and Hochberg's steps on four p-values."""
+    got = false_discovery_rate({"a": 0.01, "b": 0.02, "c": 0.03, "d": 0.5})
+    assert got == pytest.approx({"a": 0.04, "b": 0.04, "c": 0.04, "d": 0.5})
+
+
+def test_two_subjects_are_judged_together_and_alone(tmp_path: Path) -> None:
+    """A sway of the trunk in both people: named for each and for all, with one size."""
+    people = [draw_subject("sub-01", 31), draw_subject("sub-02", 32)]
+    write_study(tmp_path, people, seed=31, effects={"ang_mom": {"amplitude": 0.05}}, **LAB)
+    got = Result(tmp_path)
+    table, alone, tried = of_part(got.signals, got.pushes, got.coverage, EFFECTS, EVALUATION)
+    judged, candidates = of_cohort(dict(tuple(table.groupby("subject"))), alone, tried, EFFECTS)
+    said = candidates[(candidates["axis"] == "lateral") & (candidates["status"] == "found")]
+    assert said.groupby("subject")["effect"].agg(list).to_dict() == {s: ["ang_mom"] for s in ("all", "sub-01", "sub-02")}
+    assert isinstance(judged, pd.DataFrame)
