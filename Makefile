@@ -26,8 +26,8 @@ bench: setup ## benchmarks, against other libraries where there are any
 papers: ## compare results with the committed references
 	@$(PYTHON) -m plumbline papers
 
-discovery: setup ## hidden-effect studies
-	@echo "make discovery: nothing yet; it comes with the search for missing effects"
+discovery: setup ## is the search for missing effects right? random simulated studies, about two hours on two cores
+	@.venv/bin/python -m benchmarks.discovery
 
 data: setup ## link public data into studies/: make data DATA=FOLDER
 	@.venv/bin/plumbline data "$(DATA)"

@@ -134,6 +134,7 @@ def verdict(said: Said, evaluation: Mapping[str, Any], effects: Mapping[str, Eff
         **by_axis["lateral"],
         "by_axis": by_axis,
         "by_subject": {s: _blocks(said, "lateral", s, effects, models) for s in subjects},
+        "broken_effects": [f"{file}: {error}" for file, error in getattr(effects, "broken", [])],
     }
 
 

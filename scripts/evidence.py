@@ -10,6 +10,9 @@ from plumbline.effects import catalogue
 snakemake: Snakemake
 stamp = job.start(snakemake)
 signals, pushes, coverage = (tables.read(n, snakemake.input[n]) for n in ("signals", "pushes", "coverage"))
-made = criticism.of_part(signals, pushes, coverage, catalogue(Path(".")), snakemake.params.config)
+effects = catalogue(Path("."))
+for file, error in effects.broken:
+    print(f"{file} cannot be used and the others go on: {error}")
+made = criticism.of_part(signals, pushes, coverage, effects, snakemake.params.config)
 for name, table in zip(("evidence", "judged", "candidates"), made, strict=True):
     tables.write(name, table, snakemake.output[name], stamp)

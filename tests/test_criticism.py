@@ -158,6 +158,24 @@ def test_one_trial_gives_no_verdict_and_says_what_is_needed(shared_data: Path) -
     assert "at least 2 trials" in said["plant"]["reason"]
 
 
+def test_a_broken_effect_is_named_with_its_line_and_the_others_go_on(shared_data: Path, tmp_path: Path) -> None:
+    """One that fails when read stands in the verdict, one that fails when it computes is not judged; both with the line."""
+    (tmp_path / "effects").mkdir()
+    (tmp_path / "effects" / "typo.py").write_text("import numpy as np\n\nEFFECT = Efect()\n", encoding="utf-8")
+    late = "from plumbline.effects import Effect, Parameter\n\n\ndef columns(c):\n    return c.com_q\n\n\n"
+    late += 'EFFECT = Effect("t", "plant", "e", "s", ("com_x",), (Parameter("k", "1"),), columns=columns)\n'
+    (tmp_path / "effects" / "late.py").write_text(late, encoding="utf-8")
+    effects = catalogue(tmp_path)
+    got = disclosed(shared_data / "hidden_effect" / "ang_mom")
+    table, alone, tried = of_part(got.signals, got.pushes, got.coverage, effects, EVALUATION)
+    judged, candidates = of_cohort(dict(tuple(table.groupby("subject"))), alone, tried, effects)
+    said = verdict(Said(ladder(got.heldout), got.coverage, got.heldout, judged, candidates), EVALUATION, effects)
+    assert [m["effect"] for m in said["plant"]["missing"]] == ["ang_mom"]
+    (line,) = said["broken_effects"]
+    assert line.startswith("effects/typo.py: line 3: NameError")
+    assert "line 5" in said["plant"]["cannot_judge"]["late"]
+
+
 def test_each_rung_lowers_the_error_and_the_effect_is_what_lowers_it(shared_data: Path) -> None:
     """Angular momentum takes nine tenths off the weak error and half off the free run; a wrong effect takes off nothing."""
     got = disclosed(shared_data / "hidden_effect" / "ang_mom")

@@ -79,6 +79,7 @@ def page(
         look=first.look(verdict, tables["ladder"], known, auto),
         control=first.control(verdict, known, auto),
         auto=auto,
+        broken=verdict.get("broken_effects", []),
         counts=words.counts(tables),
         sheets=sheets.all_sheets(tables) | verdicts.all_sheets(tables, verdict, known),
         controller=controller.section(tables),

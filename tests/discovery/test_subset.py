@@ -3,12 +3,9 @@
 import sys
 from pathlib import Path
 
-import pytest
-
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from benchmarks import _score, discovery
 
-criticism = pytest.importorskip("plumbline.criticism", reason="the search that gives the verdict is not built yet")
 SMALL = {"people": 1, "trials": 6, "duration": 10.0, "force_rate": 500.0, "rate": 100.0}
 SEED = 20
 
