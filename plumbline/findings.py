@@ -94,7 +94,6 @@ def block(about: pd.Series, rows: pd.DataFrame, effects: Mapping[str, Effect], m
         "missing": missing,
         "unexplained": unexplained,
         "description": describe(about) if unexplained else "",
-        "reason": reason(about, missing),
         "refused": [
             {"effects": names, "error_mm": None if error is None else 1e3 * error, "reason": said} for names, error, said in refused
         ],
@@ -144,12 +143,11 @@ def place(shapes: Sequence[str], over: Mapping[str, float]) -> str:
     return "kinematic" if any(SHAPES[k].force is not None for k in shapes) else "moment"
 
 
-def reason(about: pd.Series, missing: Sequence[Row]) -> str:
-    """Why the verdict is what it is."""
-    if about["left"] or about["shapes"]:
+def reason(unexplained: bool, named: bool, final: float, floor: float | None) -> str:
+    """Why the verdict is what it is.  final, floor: errors [mm]."""
+    if unexplained:
         return "structure above the noise is left on trials left out"
-    if not np.isfinite(about["floor"]):
-        rest = "what is named falls by more than that between trials" if missing else "no effect lowers the error on trials left out"
+    if floor is None:
+        rest = "what is named falls by more than that between trials" if named else "no effect lowers the error on trials left out"
         return f"the noise floor is not known; {rest}"
-    named = "with what is missing " if missing else ""
-    return f"{named}held-out error is {about['final'] / about['floor']:.2f} of the noise floor"
+    return f"{'with what is missing ' if named else ''}held-out error is {final / floor:.2f} of the noise floor"

@@ -178,7 +178,10 @@ def _plant(said: Said, axis: str, subject: str, effects: Mapping[str, Effect], m
     out: dict[str, Any] = errors | findings.block(about.iloc[0], rows, effects, model)
     if not out["missing"] and not out["unexplained"]:
         out["final_error_mm"] = errors["base_error_mm"]
-    return out | {"reason": "; ".join([str(out["reason"]), *notes])}
+    if len(out["missing"]) == 1:
+        out["missing"][0]["error_before_mm"] = errors["base_error_mm"]
+    out["reason"] = findings.reason(bool(out["unexplained"]), bool(out["missing"]), out["final_error_mm"], out["noise_floor_mm"])
+    return out | {"reason": "; ".join([out["reason"], *notes])}
 
 
 def _control(said: Said, axis: str, subject: str, effects: Mapping[str, Effect], model: Sequence[str]) -> dict[str, Any]:
