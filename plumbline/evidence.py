@@ -100,11 +100,25 @@ def of_part(
     for about, frames, plants in of_trials(signals, pushes, coverage, **settings):
         for here, plant in plants.items():
             channels = of_trial(frames, here, float(about["mass"]), heights[about["subject"]])
+            follows = about["com_method"] == "force"
+            if follows:  # the CoM was made from the shear: it has nothing to say against it
+                channels = channels.changed(grf_x=np.full(len(channels.time), np.nan), grf_y=np.full(len(channels.time), np.nan))
             noise = _noise(channels, plant)  # of what was recorded: between frames some of it is averaged away
             for name, theta in (undo or {}).items():
                 channels = effects[name].undo(channels, theta)  # type: ignore[misc]
+            made = of_one(about, channels, here, plant, chosen | SHAPES)
             feet = _feet(channels) if here == "lateral" and about["support"] == "markers" else float("nan")
-            yield replace(of_one(about, channels, here, plant, chosen | SHAPES), noise=noise, centre=dict(undo or {}), feet=feet)
+            yield replace(_without_markers(made) if follows else made, noise=noise, centre=dict(undo or {}), feet=feet)
+
+
+MARKERS = ("sync", "com_bias", "soft_tissue", "offset", "tilt", "gain", "force_scale")
+"""Effects that set the force record against the markers."""
+
+
+def _without_markers(w: Weak) -> Weak:
+    """Windows whose CoM follows the force by assumption: no delay, scale or constant between the two can be told."""
+    terms = {k: v for k, v in w.terms.items() if k not in MARKERS}
+    return replace(w, terms=terms, lacking=w.lacking | dict.fromkeys((k for k in MARKERS if k in w.terms), "a CoM from markers"))
 
 
 def _feet(c: Channels) -> float:

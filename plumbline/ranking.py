@@ -25,6 +25,7 @@ PLAIN = 2.0  # [1] fall of the score that an effect must bring to be named where
 CONTACT = "push"  # found in time, see outer.py
 DROWNED = 4.0  # [1] residual over noise floor and usual faults, above which any name may be its shadow
 LEANS = 1.1  # [1] h times w2 of a person who stands with an upright trunk, to begin with
+LOWER = 0.9  # [1] of the error without it, which a constant or a contact must reach
 SHOWS = 0.6  # [1] of what noise and usual faults leave, by which an effect of any motion must lower the rms to be named
 SAME = 0.1  # [1] share of its fall that a member may lose when another effect takes its place, and the data cannot tell them apart
 ALWAYS = ("ang_mom", "height")  # physics has them in any motion; what they explain is not left, named or not
@@ -107,7 +108,8 @@ def judge(windows: Sequence[Sequence[Weak]], effects: Mapping[str, Effect], w2: 
         return replace(_judge(windows, effects, w2, h), left=("kinematic",))
     h = h or [LEANS / w for w in w2]
     finding = _judge([still[k] for k in able], effects, [w2[k] for k in able], [h[k] for k in able])
-    return _with_contact(finding, [windows[k] for k in able], [contacts[k] for k in able], [w2[k] for k in able], [h[k] for k in able])
+    told = _with_contact(finding, [windows[k] for k in able], [contacts[k] for k in able], [w2[k] for k in able], [h[k] for k in able])
+    return told or _judge(windows, effects, w2, h)
 
 
 def _judge(windows: Sequence[Sequence[Weak]], effects: Mapping[str, Effect], w2: Sequence[float], h: Sequence[float]) -> Finding:
@@ -129,6 +131,12 @@ def _plain(case: Case, members: Set) -> Set:
         members = few
     faint = {n for n in members if n in ALWAYS and need(case, members, n).share < SHOWS}
     return tuple(n for n in members if n not in faint)
+
+
+def _lowered(case: Case, names: Set, columns: set[str]) -> bool:
+    """Whether the error on trials left out is lower with some constants than with none."""
+    every = {"=moment", "=kinematic"}
+    return case.left_out(names, tuple(sorted(every - columns))) < LOWER * case.left_out(names, tuple(sorted(every)))
 
 
 def _over(case: Case, members: Set) -> dict[str, float]:
@@ -153,8 +161,8 @@ def _left(case: Case, members: Set) -> tuple[str, ...]:
 
 def _with_contact(
     finding: Finding, windows: Sequence[Sequence[Weak]], contacts: Sequence[outer.Contact | None], w2: Sequence[float], h: Sequence[float]
-) -> Finding:  # fmt: skip
-    """A finding about the windows without a contact, with the contact; errors are of all windows."""
+) -> Finding | None:  # fmt: skip
+    """A finding about the windows without a contact, with the contact; errors are of all windows.  None where its moment is not there."""
     lines, spread, gains, before, after = [], [], [], [], []
     for ws, contact, theta, k, lever in zip(windows, contacts, finding.theta, w2, h, strict=True):
         rest = {e: [_rest(w, e, theta, k, lever) for w in ws] for e in ("moment", "whole")}
@@ -179,6 +187,8 @@ def _with_contact(
         k: (float(v), float(v - r), float(v + r)) for k, v, r in zip(names, np.median(values, axis=0), half, strict=True) if v == v
     }
     error = [float(np.sqrt(np.mean(np.concatenate(e) ** 2))) for e in (before, after)]
+    if not error[1] < LOWER * error[0]:
+        return None
     t = float(np.mean(gains) / (np.std(gains, ddof=1) / np.sqrt(len(gains)) + 1e-12)) if len(gains) > 1 else 0.0
     p = float(stdtr(max(len(gains) - 1, 1), -t))
     push = Found(CONTACT, (CONTACT,), parameters, error[0], error[1], p, p)
@@ -212,7 +222,10 @@ def _finding(
         refused = [*refused, *(Refused((n,), float("nan"), "small beside what nobody explains") for n in doubtful)]
         named = [n for n in named if n not in doubtful]
     whole = len(case.equations) - 1
-    kept = [] if left or shapes else constants(case, members, [[w.feet for w in ws] for ws in windows])
+    able = not any(k in w.lacking for k in CONSTANTS[:1] for ws in windows for w in ws)
+    kept = constants(case, members, [[w.feet for w in ws] for ws in windows]) if able and not (left or shapes) else []
+    if kept and not _lowered(case, (*members, *named), {c for one in kept for c in one.columns}):
+        kept = []
     silent = tuple({"=moment", "=kinematic"} - {c for one in kept for c in one.columns})
     final = case.left_out((*members, *named), () if case.placed(members) else silent)
     base = case.left_out((), ("=moment", "=kinematic"))
