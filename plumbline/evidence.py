@@ -97,9 +97,11 @@ def of_part(
     settings: dict[str, Any] = {k: evaluation[k] for k in ("half_width", "exponent")}
     settings["axes"] = (axis,) if axis else tuple(AXES)
     heights = coverage.groupby("subject", observed=True)["height_com"].mean()
+    middles = signals.groupby("subject", observed=True)[["zmp_x", "zmp_y"]].mean()
     for about, frames, plants in of_trials(signals, pushes, coverage, **settings):
         for here, plant in plants.items():
             channels = of_trial(frames, here, float(about["mass"]), heights[about["subject"]])
+            channels = replace(channels, middle=float(middles.loc[about["subject"], f"zmp_{AXES[here]}"]))
             follows = about["com_method"] == "force"
             if follows:  # the CoM was made from the shear: it has nothing to say against it
                 channels = channels.changed(grf_x=np.full(len(channels.time), np.nan), grf_y=np.full(len(channels.time), np.nan))

@@ -1,7 +1,7 @@
 """Candidate terms of what a residual may look like: bump means of functions of the channels, nothing differentiated twice."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from plumbline.effects import Channels, Effect
 from plumbline.effects._channels import of_trial
 from plumbline.evidence import Weak
-from plumbline.plant import rows_of
+from plumbline.plant import AXES, rows_of
 from plumbline.weak import Bump
 
 Array = NDArray[np.float64]
@@ -44,6 +44,7 @@ def channels(
     heights = coverage.groupby("subject", observed=True)["height_com"].mean()
     for w in windows:
         c = of_trial(rows_of(signals, rows[w.trial]), w.axis, w.mass, heights[w.subject])
+        c = replace(c, middle=float(np.nanmean(signals.loc[signals["subject"] == w.subject, f"zmp_{AXES[w.axis]}"])))
         for name, theta in w.centre.items():
             c = effects[name].undo(c, theta)  # type: ignore[misc]
         yield c, w

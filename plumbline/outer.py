@@ -25,6 +25,7 @@ LOAD = 0.02  # [1] of body weight, the same for what the plates do not carry
 LATERAL = 0.004  # [1] of body weight, the same for a force to the side
 REST = 0.35  # [1] share of windows in which nothing must act
 ACTS = 0.03  # [1] and in which something must
+ALWAYS = 0.9  # [1] of a trial
 SIDE = 0.9  # [1] of its square that must have one sign
 EVEN = 0.02  # [1] by which a force to the side may vary while it acts, beside noise; what carries weight can be nothing else
 EVEN_NOISE = 1.5  # [1] times the noise, the same
@@ -68,7 +69,7 @@ def find(windows: Sequence[Weak], faults: float) -> Contact | None:
     known = [w.floor("kinematic", 0.1) for w in windows]
     noise = float(np.sqrt(np.mean(known))) if np.isfinite(known).all() else float(np.median(np.abs(np.concatenate(side))))
     lateral = _acts(windows, side, max(LOUD * np.hypot(noise, faults), LATERAL * G), float(noise))
-    floor = float(np.sqrt(np.nanmean([np.nan_to_num(w.floor("vertical", 0.1)) for w in windows])))
+    floor = float(np.sqrt(np.mean([np.nan_to_num(w.floor("vertical", 0.1)) for w in windows])))
     vertical = _acts(windows, down, max(LOUD * floor, LOAD * G), np.inf)
     if lateral is None and vertical is None:
         return None
@@ -93,6 +94,7 @@ def _either(a: list[Mask] | None, b: list[Mask] | None, windows: Sequence[Weak])
 def _acts(windows: Sequence[Weak], residual: Sequence[Array], least: float, noise: float) -> list[Mask] | None:
     """Windows in which a residual is a contact's, of each trial; None where it is not one.  noise: by which it may vary while it acts."""
     masks = [_runs(np.abs(r) > least, w.time) for r, w in zip(residual, windows, strict=True)]
+    masks = [m & (m.mean() < ALWAYS) for m in masks]  # all through a trial: a fault of the record would look the same
     loud, every = np.concatenate(masks), np.concatenate(list(residual))
     share = loud.mean()
     if not ACTS < share < 1 - REST:

@@ -24,7 +24,8 @@ class Channels:
     Along the axis that is judged: com_x, zmp_x, grf_x, ang_mom (about the CoM, positive turning +z towards +x); com_z (above the
     plates), grf_z, time (from the trial's start), and every other column of `signals` by its own name, x for the axis and y for the
     other. `_dot` and `_ddot` behind any name are time derivatives (central differences: the weak form averages them). w2: of the base
-    model [1/s2]; mass [kg]; rate [Hz]; height: of the CoM, one for all trials of a person [m]; g.
+    model [1/s2]; mass [kg]; rate [Hz]; height: of the CoM, one for all trials of a person [m]; middle: where
+    the person stands along the axis, the mean of the ZMP of all trials [m]; g.
     """
 
     values: Mapping[str, Array]
@@ -32,6 +33,7 @@ class Channels:
     mass: float
     height: float
     w2: float = 0.0
+    middle: float = 0.0
     g: float = G
 
     def __getitem__(self, name: str) -> Array:

@@ -7,8 +7,8 @@ from plumbline.effects._effect import Effect, Parameter
 
 
 def columns(c: Channels) -> Array:
-    """-w2 p [per 1]: first order in the scale."""
-    return np.asarray((-c.w2 * c.zmp_x)[:, None])
+    """-w2 (p - middle) [per 1]: the scale is counted from where the person is, not from the laboratory's origin."""
+    return np.asarray((-c.w2 * (c.zmp_x - c.middle))[:, None])
 
 
 def force(c: Channels) -> Array:
@@ -18,7 +18,7 @@ def force(c: Channels) -> Array:
 
 def undo(c: Channels, values: Array) -> Channels:
     """The CoM as it is."""
-    return c.changed(com_x=c.com_x / (1.0 + float(values[0])))
+    return c.changed(com_x=c.middle + (c.com_x - c.middle) / (1.0 + float(values[0])))
 
 
 EFFECT = Effect(
