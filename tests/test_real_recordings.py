@@ -1,0 +1,118 @@
+"""What the plant ledger says of real recordings: a person who stands, squats and sits down on a seat that no plate measures."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from plumbline import evidence, outer
+from plumbline.config import with_defaults
+from plumbline.criticism import of_part, settled
+from plumbline.effects import catalogue
+from plumbline.ranking import FAULT, motion
+from plumbline.recording import assemble
+from plumbline.signals import of_part as signals_of
+from plumbline.signals import subject_masses
+from plumbline.study import find
+
+EVALUATION = with_defaults({"evaluation": {"half_width": 0.3, "exponent": 3, "offset": "train", "w2": "height"}})["evaluation"]
+TASKS = {"static1": "static", "STS1": "sts", "squats1": "squats"}
+LOAD = 479.0  # [N] mean of what the seat carries, from the vertical equation of a plain prototype
+HIPS = ("L_HJC", "R_HJC")
+FOUND = ["axis", "effect", "family", "before", "after"]
+
+
+class Criticised:
+    """The plant of one subject judged, from the files, with the tasks named as told."""
+
+    def __init__(self, folder: Path, data: Path, tasks: dict[str, str]) -> None:
+        rows = ["file\tparticipant_id\tsession\ttask\tacq\trun"]
+        for run, (name, task) in enumerate(tasks.items(), 1):
+            rows += [f"{name}{end}\tsub-04\t\t{task}\t\t{run:02d}" for end in (".trc", "_grf.mot")]
+        (folder / "raw").symlink_to(data)
+        (folder / "recordings.tsv").write_text("\n".join(rows) + "\n", encoding="utf-8")
+        (folder / "participants.tsv").write_text("participant_id\tmass_kg\theight_m\tsex\nsub-04\tn/a\tn/a\tn/a\n", encoding="utf-8")
+        study = find(folder)
+        self.recordings = [assemble(t) for t in study.trials]
+        masses = subject_masses(pd.DataFrame([{"subject": "sub-04", "mass": r.mass} for r in self.recordings]))
+        self.signals, self.coverage = signals_of(self.recordings, study.participants, "auto", cutoff=2.0, masses=masses)
+        self.effects, self.pushes = catalogue(), pd.DataFrame(columns=["trial", "start", "end"])
+        _, self.judged, self.tried = of_part(self.signals, self.pushes, self.coverage, self.effects, EVALUATION)
+
+    def found(self) -> pd.DataFrame:
+        """Rows of the candidates that were found."""
+        return self.tried[self.tried["status"] == "found"]
+
+    def windows(self, axis: str) -> list[evidence.Weak]:
+        """Windows of all trials as they were judged."""
+        return settled(self.signals, self.pushes, self.coverage, self.effects, EVALUATION, axis)[0]
+
+    def contact(self, axis: str) -> tuple[list[evidence.Weak], outer.Contact | None]:
+        """Windows, and the contact that is found among them."""
+        windows = self.windows(axis)
+        return windows, outer.find(windows, float(FAULT * motion([windows], ("kinematic",))[0]))
+
+
+@pytest.fixture(scope="module")
+def data(shared_data: Path) -> Path:
+    folder = shared_data / "nimble_subject4"
+    if not folder.is_dir():
+        pytest.skip(f"no {folder}")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def person(data: Path, tmp_path_factory: pytest.TempPathFactory) -> Criticised:
+    return Criticised(tmp_path_factory.mktemp("person"), data, TASKS)
+
+
+@pytest.fixture(scope="module")
+def hips(person: Criticised) -> pd.DataFrame:
+    """Middle of the hip joint centres while sitting down and up again: time [s], x, y [m]."""
+    got = next(r for r in person.recordings if r.trial.task == "sts")
+    middle = np.mean([got.markers[k] for k in HIPS], axis=0)
+    return pd.DataFrame({"time": got.time - got.time[0], "x": middle[:, 0], "y": middle[:, 1]})
+
+
+@pytest.mark.parametrize(("axis", "letter"), [("lateral", "x"), ("forward", "y")])
+def test_seat_is_found_by_itself(person: Criticised, hips: pd.DataFrame, axis: str, letter: str) -> None:
+    """`push` is named; its load lies within 25 % of the seat's and its line within 0.12 m of the hips while it acts."""
+    found = person.found()
+    row = found[(found["axis"] == axis) & (found["effect"] == "push")]
+    assert len(row) == 1
+    values = {k: v["value"] for k, v in json.loads(row["parameters"].iloc[0]).items()}
+    assert values["force"] == pytest.approx(LOAD, rel=0.25)
+    windows, contact = person.contact(axis)
+    assert contact is not None
+    acts = np.concatenate([w.time[m] for w, m in zip(windows, contact.loud, strict=True)])
+    sitting = float(np.interp(acts, hips["time"], hips[letter]).mean())
+    assert abs(values["x"] - sitting) <= 0.12
+
+
+@pytest.mark.parametrize("axis", ["lateral", "forward"])
+def test_seat_acts_in_no_other_trial(person: Criticised, axis: str) -> None:
+    """Nothing of the kind acts in the squats or in quiet standing, with the seat's trial beside them and without it."""
+    windows, contact = person.contact(axis)
+    assert contact is not None
+    assert [w.task for w, m in zip(windows, contact.loud, strict=True) if m.any()] == ["sts"]
+    others = [w for w in windows if w.task != "sts"]
+    assert outer.find(others, float(FAULT * motion([others], ("kinematic",))[0])) is None
+
+
+def test_nobody_is_accused_of_crosstalk(person: Criticised) -> None:
+    """A measured force is a better x'' than the markers': a greedy search names crosstalk of 90 to 170 mm here."""
+    found = person.found()
+    assert not found["effect"].eq("crosstalk").any()
+    assert not found["family"].str.contains("crosstalk").any()
+
+
+def test_names_of_tasks_do_not_matter(person: Criticised, data: Path, tmp_path: Path) -> None:
+    """With every task called `other` the same is found, of the same size."""
+    mine, theirs = person.found(), Criticised(tmp_path, data, dict.fromkeys(TASKS, "other")).found()
+    pd.testing.assert_frame_equal(theirs[FOUND].reset_index(drop=True), mine[FOUND].reset_index(drop=True))
+    for a, b in zip(mine["parameters"].map(json.loads), theirs["parameters"].map(json.loads), strict=True):
+        assert {k: [v["value"], *v["ci95"]] for k, v in b.items()} == {
+            k: pytest.approx([v["value"], *v["ci95"]], rel=1e-6) for k, v in a.items()
+        }
