@@ -7,6 +7,7 @@ PAPER = [
     *expand("results/paper/{figure}.svg", figure=FIGURES),
     "results/paper/numbers.tsv",
     "results/paper/plausibility.tsv",
+    "results/paper/candidates.tsv",
     *(["results/paper/comparison.svg"] if Path("truth.json").is_file() else []),
 ]
 PAPER_CODE = digest(*sorted(Path("murai2013").rglob("*.py")), *sorted(Path(".").glob("*.py")))
@@ -77,3 +78,24 @@ rule comparison:
         config={},
     script:
         "comparison.py"
+
+
+# What could make the paper's omegas: a man of its subject's size, one candidate at a time (about a minute of one core).
+rule candidates:
+    input:
+        published="published.tsv",
+    output:
+        table="results/paper/candidates.tsv",
+        figure=report(
+            "results/paper/candidates.svg",
+            caption="captions/candidates.rst",
+            category="The paper",
+            labels={"figure": "which effects can make the omegas", "part": "all"},
+        ),
+    log:
+        "results/logs/candidates.log",
+    params:
+        code=PAPER_CODE,
+        config={},
+    script:
+        "candidates.py"
