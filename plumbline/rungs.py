@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from plumbline import evidence
+from plumbline import evidence, outer
 from plumbline.contest import decisive, own, tolerance
 from plumbline.effects import Catalogue, Channels
 from plumbline.effects._channels import of_trial
@@ -16,6 +16,7 @@ from plumbline.evidence import Weak
 from plumbline.fit import folds, free_runs
 from plumbline.physics import G
 from plumbline.plant import Plant, of_trials
+from plumbline.ranking import CONTACT, FAULT, motion
 from plumbline.search import Fit, Sums, design, fit, sums
 from plumbline.study import names
 from plumbline.tables import joined
@@ -115,14 +116,36 @@ class _Bench:
         self.sums = sums(windows, self.offered, self.w2, self.h)
         self.weight = decisive(self.sums) / tolerance(self.sums)
         self.fixed = evaluation["w2"] == "height"
+        self.about = about
+        faults = float(FAULT * motion([windows], ("kinematic",))[0])
+        self.contact = outer.find(windows, faults) if CONTACT in wanted else None
 
     def rung(self, members: Sequence[str], trials: Sequence[Trial], plants: Mapping[str, _Motion]) -> Iterator[dict[str, Any]]:
         """Rows of `rungs` of one model."""
+        if self.contact is not None and CONTACT in members:
+            yield from self._with_contact(self.contact, [m for m in members if m != CONTACT], trials)
+            return
         number = {w.trial: k for k, w in enumerate(self.windows)}
         for _, train, test in folds(trials, self.evaluation):
             got = self.fit(members, np.isin(self.sums.trial, [number[t.trial] for t in train]))
             for t in test:
                 yield self._row(number[t.trial], got, members, plants.get(t.trial))
+
+    def _with_contact(self, contact: outer.Contact, members: Sequence[str], trials: Sequence[Trial]) -> Iterator[dict[str, Any]]:
+        """The same with a contact beside the plates: the rest is fitted where it does not act; no free run, as nobody measured it."""
+        still = _Bench(outer.quiet(self.windows, contact), self.effects, set(members), self.about, self.evaluation)
+        number = {w.trial: k for k, w in enumerate(still.windows)}
+        rest = [self.error(w, self.fit(()), ()) for w in self.windows]
+        judged: set[str] = set()
+        for _, train, test in folds(trials, self.evaluation):
+            got = still.fit(members, np.isin(still.sums.trial, [number[t.trial] for t in train if t.trial in number]))
+            for t in test:
+                judged.add(t.trial)
+                k = next(k for k, w in enumerate(self.windows) if w.trial == t.trial)
+                rest[k] = still.error(self.windows[k], got, (*members, CONTACT))
+        for w, error in zip(self.windows, outer.explained(self.windows, contact, rest), strict=True):
+            if w.trial in judged:
+                yield self._told(w, error, np.zeros(0))
 
     def fit(self, members: Sequence[str], among: NDArray[np.bool_] | None = None) -> Fit:
         """Coefficients of a model over some pieces."""
@@ -136,8 +159,10 @@ class _Bench:
 
     def _row(self, k: int, got: Fit, members: Sequence[str], motion: _Motion | None) -> dict[str, Any]:
         w = self.windows[k]
-        error = self.error(w, got, members)
         miss = self._free(got, members, motion) if motion is not None else np.zeros(0)
+        return self._told(w, self.error(w, got, members), miss)
+
+    def _told(self, w: Weak, error: Array, miss: Array) -> dict[str, Any]:
         return {
             "trial": w.trial, "subject": w.subject, "task": w.task, "condition": w.condition, "axis": w.axis, "windows": len(error),
             "square_sum": float(error @ error), "free_run_frames": len(miss), "free_run_square_sum": float(miss @ miss),
