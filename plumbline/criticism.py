@@ -13,10 +13,11 @@ from plumbline import evidence, findings
 from plumbline.effects import Catalogue, Effect
 from plumbline.evidence import Weak
 from plumbline.formulas import formulas, remains
+from plumbline.found import Finding
 from plumbline.library import channels, library
 from plumbline.physics import G
 from plumbline.plant import AXES
-from plumbline.ranking import LEANS, Finding, judge
+from plumbline.ranking import LEANS, judge
 from plumbline.structure import structure
 from plumbline.tables import TABLES, read
 

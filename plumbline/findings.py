@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from plumbline.effects import Effect
-from plumbline.ranking import Candidate, Finding, Found
+from plumbline.found import Candidate, Finding, Found
 from plumbline.shapes import SHAPES
 
 Row = dict[str, Any]

@@ -1,23 +1,24 @@
 """What the data say is missing: the set that predicts trials left out, its constants, its families, and what became of every candidate."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtr, stdtrit
 
 from plumbline import outer
+from plumbline.candidates import CONSTANTS, candidates
 from plumbline.constants import constants
-from plumbline.contest import FALL, SURE, Case, Need, Refused, beyond, case_of, constant, need, pruned, search
+from plumbline.contest import FALL, Case, Need, Refused, case_of, constant, need, pruned, search
 from plumbline.effects import Effect
 from plumbline.evidence import Weak
+from plumbline.found import Candidate, Finding, Found, Interval
 from plumbline.search import BASE, Fit, Sums, design, sums
 from plumbline.shapes import BESIDE, SHAPES
 
 Array = NDArray[np.float64]
 Set = tuple[str, ...]
-Interval = tuple[float, float, float]
 
 FAULT = 0.005  # [1] of the motion that a segment table and rigid segments leave in any study
 LEFT = 1.35  # [1] residual over noise floor and that, above which something is left
@@ -29,68 +30,6 @@ LOWER = 0.9  # [1] of the error without it, which a constant or a contact must r
 SHOWS = 0.6  # [1] of what noise and usual faults leave, by which an effect of any motion must lower the rms to be named
 SAME = 0.1  # [1] share of its fall that a member may lose when another effect takes its place, and the data cannot tell them apart
 ALWAYS = ("ang_mom", "height")  # physics has them in any motion; what they explain is not left, named or not
-CONSTANTS = ("offset", "tilt")  # a constant on the moment side, on the kinematic side: judged last, from what is always fitted
-
-
-@dataclass(frozen=True)
-class Found:
-    """One effect that the data want.
-
-    effect: id, or empty where only the family can be told.  parameters: name -> value and 95 % interval.
-    before, after: held-out error without and with it [m].  p: of no fall.  q: the same, false discovery rate over the catalogue.
-    """
-
-    effect: str
-    family: tuple[str, ...]
-    parameters: Mapping[str, Interval]
-    before: float
-    after: float
-    p: float
-    q: float
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """What became of an effect of the catalogue.
-
-    status: found, settled (fitted always, too small for a name), idle (brings nothing), refused, absorbed, alike (of a family that is
-    named) or lacking.  error: held-out error with it beside the final model [m].  low, high: 95 % interval of the fall that it brings [m].
-    vif: variance inflation beside the final model.  trials: that would find such an effect with 80 % power.  reason: in words.
-    """
-
-    effect: str
-    status: str
-    error: float = float("nan")
-    low: float = float("nan")
-    high: float = float("nan")
-    q: float = float("nan")
-    vif: float = float("nan")
-    trials: float = float("nan")
-    reason: str = ""
-
-
-@dataclass(frozen=True)
-class Finding:
-    """What the data of one subject (or of several, pooled) say on one axis.
-
-    found: effects.  shapes: shapes without a cause that the residual needs.  refused: impostors.  candidates: every effect.
-    lacking: effect -> channels that are missing.  base, final: held-out error of the paper's equation and of the last model [m].
-    floor: what sensor noise gives [m], NaN where not known.  over: equation -> residual over noise floor and usual faults.
-    left: the equations in which more is left than noise and a model's usual faults explain; empty where the floor is not known.
-    theta: of each subject, effect or base column -> coefficients of the last model.
-    """
-
-    found: Sequence[Found] = ()
-    shapes: Set = ()
-    refused: Sequence[Refused] = ()
-    candidates: Sequence[Candidate] = ()
-    lacking: Mapping[str, str] = field(default_factory=dict)
-    base: float = float("nan")
-    final: float = float("nan")
-    floor: float = float("nan")
-    over: Mapping[str, float] = field(default_factory=dict)
-    left: tuple[str, ...] = ()
-    theta: Sequence[Mapping[str, Array]] = ()
 
 
 def judge(windows: Sequence[Sequence[Weak]], effects: Mapping[str, Effect], w2: Sequence[float], h: Sequence[float] = ()) -> Finding:
@@ -234,7 +173,7 @@ def _finding(
         found = _with_constant(found, one.effect, one.family, one.parameters, final, one.size, one.p)
     fits = [case.fit(s, members) for s in case.sums]
     theta = [{n: f.of(s, n)[0] for n in dict.fromkeys(s.columns[c][0] for c in f.columns)} for s, f in zip(case.sums, fits, strict=True)]
-    tried = _candidates(case, members, found, needs, refused, absorbed, lacking)
+    tried = candidates(case, members, found, needs, refused, absorbed, lacking)
     q = {c.effect: c.q for c in tried}
     found = [replace(f, q=q.get(f.effect, f.p)) for f in found]
     return Finding(found, shapes, refused, tried, lacking, base, final, float(case.floor[whole]), over, left, theta)
@@ -310,76 +249,3 @@ def _with_constant(
             both = replace(one, parameters={**one.parameters, **(parameters if effect == one.effect else {})})
             return [*found[:k], replace(both, before=float(np.hypot(one.before, size))), *found[k + 1 :]]
     return [*found, Found(effect, family, parameters, float(np.hypot(final, size)), final, p, p)]
-
-
-# -- what became of every candidate -----------------------------------------------------------------------------------
-
-
-def _candidates(
-    case: Case, members: Set, found: Sequence[Found], needs: Mapping[str, Need], refused: Sequence[Refused],
-    absorbed: Mapping[str, str], lacking: Mapping[str, str],
-) -> list[Candidate]:  # fmt: skip
-    out: dict[str, Candidate] = {}
-    named = {f.effect: f for f in found}
-    family = {k: f.effect for f in found for k in f.family}
-    for name, effect in case.effects.items():
-        if name in SHAPES or effect.ledger != "plant":
-            continue
-        if name in named and name in CONSTANTS:
-            out[name] = Candidate(name, "found", named[name].after, q=named[name].p)
-        elif name in needs:
-            status = "found" if name in named else "settled" if name in case.settled else "refused"
-            out[name] = _measured(case, members, name, needs[name], status)
-        elif name in family:
-            out[name] = Candidate(name, "alike", reason=f"these data cannot tell it from {family[name] or 'the others of its family'}")
-        elif name in absorbed or effect.twin == "w2":
-            out[name] = Candidate(name, "absorbed", reason=absorbed.get(name, "a fitted w2 takes all of it"))
-        elif name in case.rivals:
-            alike = case.twins[name] & {*members, *case.settled}
-            apart = tuple(m for m in members if m not in case.twins[name])
-            tried = _measured(case, (*apart, name), name, need(case, (*apart, name), name), "idle")
-            out[name] = replace(tried, status="alike", reason=f"stands in for {', '.join(sorted(alike))}") if alike else tried
-        else:
-            out[name] = Candidate(name, "idle")
-    for one in refused:
-        for name in one.effects:
-            if name in out and out[name].status == "idle" and name in one.reason:
-                out[name] = replace(out[name], status="refused", reason=one.reason)
-    out |= {name: Candidate(name, "lacking", reason=f"cannot be judged: needs {what}") for name, what in lacking.items()}
-    p = {k: c.q for k, c in out.items() if np.isfinite(c.q)}
-    q = false_discovery_rate(p)
-    return [replace(c, q=q.get(k, float("nan"))) for k, c in sorted(out.items())]
-
-
-def _measured(case: Case, members: Set, name: str, needed: Need, status: str) -> Candidate:
-    """Error with and without an effect, the fall with its interval from piece to piece."""
-    pairs = case.with_and_without(members, name)
-    v1 = case.variance([e[:1] for e in pairs])[0, -1]
-    falls = np.concatenate([_falls(s, e) for s, e in zip(case.sums, pairs, strict=True)])
-    half = stdtrit(max(len(falls) - 1, 1), 0.975) * falls.std(ddof=1) / np.sqrt(len(falls)) if len(falls) > 1 else float("inf")
-    mean, root = float(falls.mean()), float(np.sqrt(v1))
-    low, high = (float(np.sign(v) * (np.sqrt(v1 + abs(v)) - root)) for v in (mean - half, mean + half))
-    beside = tuple(n for n in members if n != name)
-    share = beyond(case.sums, case.weight, name, beside)
-    # SURE is a rate over the catalogue: q holds p until all are known
-    return Candidate(name, status, root, low, high, needed.p, 1 / max(share, 1e-9), needed.trials)
-
-
-def _falls(s: Sums, errors: Array) -> Array:
-    """Fall of the variance in the equation that is reported [m2], trial by trial.  errors: with and without, (2, E, C)."""
-    count = np.bincount(s.trial, s.count[-1])
-    with_it, lacks = (np.bincount(s.trial, e) / count for e in errors[:, -1])
-    return np.asarray(lacks - with_it)
-
-
-def false_discovery_rate(p: Mapping[str, float]) -> dict[str, float]:
-    """q of each p: Benjamini and Hochberg 1995."""
-    order = sorted(p, key=lambda k: -p[k])
-    out, least = {}, 1.0
-    for rank, name in zip(range(len(order), 0, -1), order, strict=True):
-        least = min(least, p[name] * len(order) / rank)
-        out[name] = least
-    return out
-
-
-__all__ = ["SURE", "Candidate", "Finding", "Found", "Refused", "judge"]

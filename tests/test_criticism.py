@@ -9,11 +9,12 @@ import pytest
 from made_study import EVALUATION, Result
 
 from plumbline import evidence, rungs
+from plumbline.candidates import false_discovery_rate
 from plumbline.constants import _Level, _moment
 from plumbline.criticism import of_cohort, of_part, settled
 from plumbline.effects import catalogue
+from plumbline.found import Finding
 from plumbline.ladder import Said, ladder, verdict
-from plumbline.ranking import Finding, false_discovery_rate
 from plumbline.simulate.person import draw_subject
 from plumbline.simulate.study import write_study
 

@@ -9,7 +9,7 @@ from made_study import EVALUATION, Result
 from plumbline.criticism import settled
 from plumbline.effects import catalogue
 from plumbline.evidence import Weak
-from plumbline.ranking import Finding
+from plumbline.found import Finding
 from plumbline.search import design, fit, heldout, subsets, sums
 
 
@@ -19,7 +19,9 @@ def lateral(folder: Path, drop: tuple[str, ...] = ()) -> tuple[list[Weak], Findi
     signals = got.signals.copy()
     for name in drop:
         signals[name] = np.nan
-    return next(iter(settled(signals, got.pushes, got.coverage, catalogue(), EVALUATION)))
+    windows, finding = settled(signals, got.pushes, got.coverage, catalogue(), EVALUATION, "lateral")
+    assert finding is not None
+    return windows, finding
 
 
 TRUTH = {

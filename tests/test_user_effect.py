@@ -11,7 +11,7 @@ from plumbline import cli
 from plumbline.config import models, study_config
 from plumbline.criticism import settled
 from plumbline.effects import Catalogue, catalogue
-from plumbline.ranking import Finding
+from plumbline.found import Finding
 from plumbline.simulate.person import draw_subject
 from plumbline.simulate.study import write_study
 
@@ -30,7 +30,9 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Result]:
 
 def judged(result: Result, known: Catalogue) -> Finding:
     """What the plant lacks, lateral axis, all subjects."""
-    return next(iter(settled(result.signals, result.pushes, result.coverage, known, EVALUATION)))[1]
+    _, finding = settled(result.signals, result.pushes, result.coverage, known, EVALUATION, "lateral")
+    assert finding is not None
+    return finding
 
 
 def test_without_the_file_something_is_left_and_nobody_is_named(made: tuple[Path, Result]) -> None:

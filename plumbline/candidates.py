@@ -1,0 +1,84 @@
+"""What became of every effect of the catalogue beside the model that was found."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import stdtrit
+
+from plumbline.contest import Case, Need, Refused, Set, beyond, need
+from plumbline.found import Candidate, Found
+from plumbline.search import Sums
+from plumbline.shapes import SHAPES
+
+Array = NDArray[np.float64]
+CONSTANTS = ("offset", "tilt")  # a constant on the moment side, on the kinematic side: judged last, from what is always fitted
+
+
+def candidates(
+    case: Case, members: Set, found: Sequence[Found], needs: Mapping[str, Need], refused: Sequence[Refused],
+    absorbed: Mapping[str, str], lacking: Mapping[str, str],
+) -> list[Candidate]:  # fmt: skip
+    """Every effect with its status; sizes and p-values are those it would have beside the members."""
+    out: dict[str, Candidate] = {}
+    named = {f.effect: f for f in found}
+    family = {k: f.effect for f in found for k in f.family}
+    for name, effect in case.effects.items():
+        if name in SHAPES or effect.ledger != "plant":
+            continue
+        if name in named and name in CONSTANTS:
+            out[name] = Candidate(name, "found", named[name].after, q=named[name].p)
+        elif name in needs:
+            status = "found" if name in named else "settled" if name in case.settled else "refused"
+            out[name] = _measured(case, members, name, needs[name], status)
+        elif name in family:
+            out[name] = Candidate(name, "alike", reason=f"these data cannot tell it from {family[name] or 'the others of its family'}")
+        elif name in absorbed or effect.twin == "w2":
+            out[name] = Candidate(name, "absorbed", reason=absorbed.get(name, "a fitted w2 takes all of it"))
+        elif name in case.rivals:
+            alike = case.twins[name] & {*members, *case.settled}
+            apart = tuple(m for m in members if m not in case.twins[name])
+            tried = _measured(case, (*apart, name), name, need(case, (*apart, name), name), "idle")
+            out[name] = replace(tried, status="alike", reason=f"stands in for {', '.join(sorted(alike))}") if alike else tried
+        else:
+            out[name] = Candidate(name, "idle")
+    for one in refused:
+        for name in one.effects:
+            if name in out and out[name].status == "idle" and name in one.reason:
+                out[name] = replace(out[name], status="refused", reason=one.reason)
+    out |= {name: Candidate(name, "lacking", reason=f"cannot be judged: needs {what}") for name, what in lacking.items()}
+    p = {k: c.q for k, c in out.items() if np.isfinite(c.q)}
+    q = false_discovery_rate(p)
+    return [replace(c, q=q.get(k, float("nan"))) for k, c in sorted(out.items())]
+
+
+def _measured(case: Case, members: Set, name: str, needed: Need, status: str) -> Candidate:
+    """Error with and without an effect, the fall with its interval from piece to piece."""
+    pairs = case.with_and_without(members, name)
+    v1 = case.variance([e[:1] for e in pairs])[0, -1]
+    falls = np.concatenate([_falls(s, e) for s, e in zip(case.sums, pairs, strict=True)])
+    half = stdtrit(max(len(falls) - 1, 1), 0.975) * falls.std(ddof=1) / np.sqrt(len(falls)) if len(falls) > 1 else float("inf")
+    mean, root = float(falls.mean()), float(np.sqrt(v1))
+    low, high = (float(np.sign(v) * (np.sqrt(v1 + abs(v)) - root)) for v in (mean - half, mean + half))
+    beside = tuple(n for n in members if n != name)
+    share = beyond(case.sums, case.weight, name, beside)
+    # SURE is a rate over the catalogue: q holds p until all are known
+    return Candidate(name, status, root, low, high, needed.p, 1 / max(share, 1e-9), needed.trials)
+
+
+def _falls(s: Sums, errors: Array) -> Array:
+    """Fall of the variance in the equation that is reported [m2], trial by trial.  errors: with and without, (2, E, C)."""
+    count = np.bincount(s.trial, s.count[-1])
+    with_it, lacks = (np.bincount(s.trial, e) / count for e in errors[:, -1])
+    return np.asarray(lacks - with_it)
+
+
+def false_discovery_rate(p: Mapping[str, float]) -> dict[str, float]:
+    """q of each p: Benjamini and Hochberg 1995."""
+    order = sorted(p, key=lambda k: -p[k])
+    out, least = {}, 1.0
+    for rank, name in zip(range(len(order), 0, -1), order, strict=True):
+        least = min(least, p[name] * len(order) / rank)
+        out[name] = least
+    return out
