@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from plumbline.contest import Case, Need, Refused, Set, beyond, need
+from plumbline.effects import Effect
 from plumbline.found import Candidate, Found
 from plumbline.search import Sums
 from plumbline.shapes import SHAPES
@@ -42,7 +43,7 @@ def candidates(
             tried = _measured(case, (*apart, name), name, need(case, (*apart, name), name), "idle")
             out[name] = replace(tried, status="alike", reason=f"stands in for {', '.join(sorted(alike))}") if alike else tried
         else:
-            out[name] = Candidate(name, "idle")
+            out[name] = Candidate(name, "idle", reason=_untried(effect))
     for one in refused:
         for name in one.effects:
             if name in out and out[name].status == "idle" and name in one.reason:
@@ -72,6 +73,15 @@ def _falls(s: Sums, errors: Array) -> Array:
     count = np.bincount(s.trial, s.count[-1])
     with_it, lacks = (np.bincount(s.trial, e) / count for e in errors[:, -1])
     return np.asarray(lacks - with_it)
+
+
+def _untried(effect: Effect) -> str:
+    """Why an effect has no numbers of its own."""
+    if effect.id in CONSTANTS:
+        return "told by a constant: none that is large enough"
+    if effect.twin:
+        return f"no motion tells it from {effect.twin}"
+    return "no contact is seen that the plates miss"
 
 
 def false_discovery_rate(p: Mapping[str, float]) -> dict[str, float]:

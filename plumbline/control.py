@@ -8,6 +8,7 @@ the plant ledger are taken out before: a force record 16 ms late looks like a re
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,8 @@ from numpy.typing import NDArray
 from plumbline.control_rows import blank, of_fit
 from plumbline.control_scene import FEWEST_LOCI, Known, Sizes, Stage, staged
 from plumbline.control_shapes import offered
-from plumbline.effects import Effect, catalogue
+from plumbline.effects import HERE as LIBRARY
+from plumbline.effects import Effect, catalogue, where
 from plumbline.estimators import loop_error
 from plumbline.estimators.loop_error import Candidate, Criterion, Fit
 from plumbline.models.loop import Scene, Term, simulate
@@ -72,8 +74,23 @@ def of_part(
         if isinstance(found, str):
             rows.append(blank() | about | {"reason": found})
             continue
+        known = {k: e for k, e in known.items() if _works(e, found)}
         rows += [row | about for row in _ledger(found, known, tuple(sorted(set(model) & set(known))))]
     return pd.DataFrame(rows, columns=[c.name for c in TABLES["control"]])
+
+
+def _works(effect: Effect, stage: Stage) -> bool:
+    """Whether a study's own effect can be simulated; where not, the log says why and the others go on."""
+    if Path(effect.file).parent == LIBRARY:
+        return True
+    for term in effect.law:
+        try:
+            sizes = np.concatenate([stage.base, term.starts[0]])
+            simulate(sizes[:, None, None], stage.scene, [(term, len(effect.parameters))])
+        except Exception as error:  # a user's file may fail in any way
+            print(f"{effect.file} cannot be used and the others go on: {where(error, Path(effect.file))}")
+            return False
+    return True
 
 
 # -- the ledger -------------------------------------------------------------------------------------------------------

@@ -119,7 +119,7 @@ def _joined(found: str, name: str) -> str:
 def _reason(missing: Sequence[Mapping[str, Any]], sums: "_Sums", found: str) -> str:
     floor = "the floor is what the feedback noise left by the best law makes of the CoM"
     if not missing:
-        return f"no listed effect predicts the ZMP of trials left out better than the base law does; {floor}"
+        return f"no listed effect predicts trials left out enough better than the base law to be named; {floor}"
     share = 1 - sums.score(found).sum() / sums.score("").sum()
     names = " and ".join(" or ".join(m["family"]) for m in missing)
     return f"{names} takes {100 * share:.0f} % off the ZMP's squared error on trials left out, freed of its colour; {floor}"

@@ -203,9 +203,13 @@ def _parts(effect: Effect, c: Channels) -> dict[str, Array]:
     assert effect.columns is not None
     plain = effect.columns(_with(c, 0.0))
     parts = {"plain": plain, "by_w2": effect.columns(_with(c, 1.0)) - plain}
-    nothing = np.zeros_like(plain)
+    nothing = np.zeros(np.shape(plain))
     parts["force"] = effect.force(c) if effect.force is not None and c.has("grf_x") else nothing
     parts["vertical"] = effect.vertical(c) if effect.vertical is not None and c.has("grf_z") else nothing
+    for part, values in parts.items():
+        if np.ndim(values) != 2 or len(values) != len(c.time) or np.shape(values)[1] != np.shape(plain)[1]:
+            want = f"{len(c.time)} rows and as many columns as `columns` has"
+            raise ValueError(f"{part} has the shape {np.shape(values)}; wanted are {want}: write (...)[:, None] or np.column_stack")
     return parts
 
 

@@ -1,6 +1,6 @@
 """The ladder: held-out error of each model, and the verdict other programs read."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -25,7 +25,7 @@ NOTHING = {"kind": "weak"} | dict.fromkeys(("error_mm", "ci_low_mm", "ci_high_mm
 
 def ladder(
     heldout: pd.DataFrame, rungs: pd.DataFrame | None = None, control: pd.DataFrame | None = None,
-    effects: Mapping[str, Effect] | None = None,
+    effects: Mapping[str, Effect] | None = None, unsettled: Collection[str] = (),
 ) -> pd.DataFrame:  # fmt: skip
     """Table `ladder`: the base rung and one per model, pooled and per task, subject and condition, weak and free-run; and of the law.
 
@@ -45,15 +45,17 @@ def ladder(
             for task, subject, condition, group in _groups(mine):
                 key = {"axis": axis, "task": task, "subject": subject, "condition": condition}
                 rows += [{"ledger": "plant", **key, "model": model, "effects": names, **r} for r in rungs_of(group)]
-    rows += control_rungs(empty("control") if control is None else control, effects)
+    rows += control_rungs(empty("control") if control is None else control, effects, unsettled)
     return pd.DataFrame(rows, columns=[c.name for c in TABLES["ladder"]])
 
 
-def control_rungs(control: pd.DataFrame, effects: Mapping[str, Effect] | None) -> Iterator[dict[str, Any]]:
+def control_rungs(
+    control: pd.DataFrame, effects: Mapping[str, Effect] | None, unsettled: Collection[str]
+) -> Iterator[dict[str, Any]]:  # fmt: skip
     """Rungs of the control ledger: the base law, and each effect found; error of the simulated CoM on loci left out."""
     scopes = [("all", control), *((str(s), rows) for s, rows in control.groupby("subject", observed=True))]
     for subject, rows in scopes:
-        said = control_verdict.judge(rows, (), effects)
+        said = control_verdict.judge(rows, (), effects, settled=subject not in unsettled)
         if said["missing"] is None:
             continue
         names: list[str] = []
@@ -150,6 +152,12 @@ def _model(said: Said, axis: str, models: Models) -> list[str]:
     return [*plant, *(m["effect"] for m in control or [])]
 
 
+def unsettled(judged: pd.DataFrame) -> set[str]:
+    """Subjects (or all) whose lateral plant lacks something that no effect explains: nothing is said about their law."""
+    mine = judged[(judged["axis"] == "lateral") & ((judged["left"] != "") | (judged["shapes"] != ""))]
+    return set(mine["subject"])
+
+
 def _blocks(said: Said, axis: str, subject: str, effects: Mapping[str, Effect], models: Models) -> dict[str, Any]:
     model = _model(said, axis, models)
     return {"plant": _plant(said, axis, subject, effects, model), "control": _control(said, axis, subject, effects, model)}
@@ -188,9 +196,7 @@ def _control(said: Said, axis: str, subject: str, effects: Mapping[str, Effect],
     if axis != "lateral":
         return blank("the controller is judged on the lateral axis alone")
     rows = said.control if subject == "all" else said.control[said.control["subject"] == subject]
-    about = said.judged[(said.judged["axis"] == axis) & (said.judged["subject"] == subject)]
-    settled = about.empty or not (about["left"].iloc[0] or about["shapes"].iloc[0])
-    return control_verdict.judge(rows, model, effects, settled=bool(settled))
+    return control_verdict.judge(rows, model, effects, settled=subject not in unsettled(said.judged))
 
 
 def blank(reason: str) -> dict[str, Any]:

@@ -131,9 +131,10 @@ def _with_contact(
     t = float(np.mean(gains) / (np.std(gains, ddof=1) / np.sqrt(len(gains)) + 1e-12)) if len(gains) > 1 else 0.0
     p = float(stdtr(max(len(gains) - 1, 1), -t))
     push = Found(CONTACT, (CONTACT,), parameters, error[0], error[1], p, p)
-    others = [c for c in finding.candidates if c.effect != CONTACT]
+    tried = [c for c in finding.candidates if c.effect != CONTACT]
     mine = Candidate(CONTACT, "found", error[1], q=p)
-    return replace(finding, found=[push, *finding.found], candidates=sorted([*others, mine], key=lambda c: c.effect), final=error[1])
+    others = [replace(f, before=float(np.sqrt(max(error[1] ** 2 + f.before**2 - f.after**2, 0.0))), after=error[1]) for f in finding.found]
+    return replace(finding, found=[push, *others], candidates=sorted([*tried, mine], key=lambda c: c.effect), final=error[1])
 
 
 def _rest(w: Weak, equation: str, theta: Mapping[str, Array], w2: float, h: float) -> Array:

@@ -67,10 +67,13 @@ def of_part(
         plants = _plants(signals, pushes, coverage[coverage["subject"] == subject], str(axis), evaluation)
         called = {str(r["trial"]): names(r["trial"], r["task"], str(r["files"]).split(" + ")) for _, r in coverage.iterrows()}
         trials = [Trial(w.trial, frozenset(called[w.trial])) for w in bench.windows]
-        for number, (name, members) in enumerate(chosen, 1):
-            about_model = {"rung": number, "model": name, "effects": ", ".join(members)}
+        for number, (name, listed) in enumerate(chosen, 1):
+            members = [m for m in listed if effects[m].ledger == "plant" and (m != CONTACT or bench.contact is not None)]
+            if not members:  # a rung of the law, or a contact that is not seen in these data
+                continue
+            about_model = {"rung": number, "model": name, "effects": ", ".join(listed)}
             rungs += [row | about_model for row in bench.rung(members, trials, plants)]
-        shown.append(bench.contributions(chosen, near))
+        shown.append(bench.contributions([(n, tuple(m for m in ms if effects[m].ledger == "plant")) for n, ms in chosen], near))
     return joined("rungs", [pd.DataFrame(rungs)] if rungs else []), joined("contributions", shown)
 
 

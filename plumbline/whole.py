@@ -9,7 +9,7 @@ from plumbline import control, rungs
 from plumbline.config import models, with_defaults
 from plumbline.criticism import known, of_cohort, of_part
 from plumbline.effects import Catalogue, catalogue
-from plumbline.ladder import Said, ladder, verdict
+from plumbline.ladder import Said, ladder, unsettled, verdict
 
 CRITICISM = ("evidence", "judged", "candidates", "control", "rungs", "ladder")
 
@@ -35,7 +35,7 @@ def criticised(
     made["rungs"], _ = rungs.of_part(
         tables["signals"], tables["pushes"], coverage, made["evidence"], made["judged"], made["candidates"], effects, listed, evaluation
     )
-    made["ladder"] = ladder(tables["heldout"], made["rungs"], made["control"], effects)
+    made["ladder"] = ladder(tables["heldout"], made["rungs"], made["control"], effects, unsettled(made["judged"]))
     said = Said(made["ladder"], tables["coverage"], tables["heldout"], made["judged"], made["candidates"], made["control"])
     made["verdict"] = verdict(said, evaluation, effects, listed)
     return made

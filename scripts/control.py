@@ -13,8 +13,8 @@ stamp = job.start(snakemake)
 read = {n: tables.read(n, snakemake.input[n]) for n in ("signals", "pushes", "loci", "coverage", "trust", "clusters", "controller")}
 effects = catalogue(Path("."))
 judged, tried = (tables.read(n, snakemake.input[n]) for n in ("judged", "candidates"))
-listed = [] if snakemake.params.models == "auto" else [e for names in snakemake.params.models.values() for e in names]
-model = sorted({e for e in listed if e in effects and effects[e].ledger == "control"})
 faults, forces = known(judged, tried, effects)
-made = control.of_part(**read, evaluation=snakemake.params.config, corrected=faults, plant=forces, effects=effects, model=model)
+made = control.of_part(
+    **read, evaluation=snakemake.params.config, corrected=faults, plant=forces, effects=effects, model=snakemake.params.model
+)
 tables.write("control", made, snakemake.output.control, stamp)

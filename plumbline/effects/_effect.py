@@ -89,6 +89,8 @@ class Effect:
             raise ValueError(f"ledger '{self.ledger}': one of {', '.join(LEDGERS)} is wanted")
         if not self.parameters:
             raise ValueError("an effect needs at least one Parameter")
+        if self.ledger == "plant" and self.columns is None:
+            raise ValueError("a plant effect needs columns: a function of the channels that gives (n, k) [m/s2]")
         if isinstance(self.needs, str) or isinstance(self.confounded, str):
             raise ValueError("needs and confounded are tuples: write ('com_x',) with the comma")
 

@@ -67,6 +67,15 @@ def code(script, *modules):
     return digest(REPO / "scripts" / script, *(REPO / "plumbline" / m for m in modules))
 
 
+def of_the_law(models):
+    """Control effects among those that the config lists: the control ledger re-runs for no other."""
+    listed = [] if models == "auto" else [e for names in models.values() for e in names]
+    files = [
+        f for e in sorted(set(listed)) for f in (Path("effects") / f"{e}.py", REPO / "plumbline" / "effects" / f"{e}.py") if f.is_file()
+    ]
+    return [f.stem for f in files if 'ledger="control"' in f.read_text(encoding="utf-8")]
+
+
 def parts(table):
     """Files of a table for every part."""
     return expand("results/{table}/{part}.parquet", table=table, part=PARTS)

@@ -19,6 +19,6 @@ rule control:
     params:
         code=code("control.py"),
         config=config["evaluation"],
-        models=config["models"],
+        model=of_the_law(config["models"]),
     script:
         "../../scripts/control.py"
