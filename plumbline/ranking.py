@@ -22,6 +22,7 @@ Set = tuple[str, ...]
 
 FAULT = 0.005  # [1] of the motion that a segment table and rigid segments leave in any study
 LEFT = 1.35  # [1] residual over noise floor and that, above which something is left
+WHOLE = 1.5  # [1] the same of the whole equation, where both halves are well explained and not together
 PLAIN = 2.0  # [1] fall of the score that an effect must bring to be named where something is left that nobody explains
 CONTACT = "push"  # found in time, see outer.py
 DROWNED = 4.0  # [1] residual over noise floor and usual faults, above which any name may be its shadow
@@ -92,6 +93,12 @@ def _over(case: Case, members: Set) -> dict[str, float]:
 def _left(case: Case, members: Set) -> tuple[str, ...]:
     """Equations in which more is left than noise and a model's usual faults explain."""
     over = _over(case, members)
+    if over["whole"] > WHOLE:  # parameters that suit each half alone and not both
+        return tuple(dict.fromkeys((*_parts_left(case, over), "whole")))
+    return _parts_left(case, over)
+
+
+def _parts_left(case: Case, over: Mapping[str, float]) -> tuple[str, ...]:
     return tuple(e for e, w, z in zip(over, case.weight, case.as_zmp, strict=True) if w * z > 0 and over[e] > LEFT)
 
 
