@@ -58,9 +58,10 @@ def test_every_stage_leaves_tables_with_units_and_digest(small: Path) -> None:
 
 
 def test_the_interfaces_for_other_programs(small: Path) -> None:
-    """verdict.json and ladder.parquet exist with the base row; nothing is claimed to be missing or not missing."""
+    """verdict.json and ladder.parquet exist with the base row; two people who hide nothing are accused of nothing."""
     said = json.loads((small / "results" / "verdict.json").read_text())
-    assert said["plant"]["missing"] is None
+    assert said["plant"]["missing"] == []
+    assert said["plant"]["unexplained"] is False
     assert 0.05 < said["plant"]["base_error_mm"] < 1.0
     assert said["plant"]["noise_floor_mm"] == pytest.approx(said["plant"]["base_error_mm"], rel=0.3)
     ladder = pd.read_parquet(small / "results" / "ladder.parquet")
