@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from plumbline.contest import Case, Need, Refused, Set, beyond, need
+from plumbline.contest import Case, Need, Refused, Set, beyond, need, units
 from plumbline.effects import Effect
 from plumbline.found import Candidate, Found
-from plumbline.search import Sums
+from plumbline.search import CLUSTERS, Sums
 from plumbline.shapes import SHAPES
 
 Array = NDArray[np.float64]
@@ -29,7 +29,7 @@ def candidates(
         if name in SHAPES or effect.ledger != "plant":
             continue
         if name in named and name in CONSTANTS:
-            out[name] = Candidate(name, "found", named[name].after, q=named[name].p)
+            out[name] = Candidate(name, "found", named[name].after, p=named[name].p)
         elif name in needs:
             status = "found" if name in named else "settled" if name in case.settled else "refused"
             out[name] = _measured(case, members, name, needs[name], status)
@@ -49,29 +49,29 @@ def candidates(
             if name in out and out[name].status == "idle" and name in one.reason:
                 out[name] = replace(out[name], status="refused", reason=one.reason)
     out |= {name: Candidate(name, "lacking", reason=f"cannot be judged: needs {what}") for name, what in lacking.items()}
-    p = {k: c.q for k, c in out.items() if np.isfinite(c.q)}
-    q = false_discovery_rate(p)
-    return [replace(c, q=q.get(k, float("nan"))) for k, c in sorted(out.items())]
+    return [out[k] for k in sorted(out)]
 
 
 def _measured(case: Case, members: Set, name: str, needed: Need, status: str) -> Candidate:
     """Error with and without an effect, the fall with its interval from piece to piece."""
     pairs = case.with_and_without(members, name)
     v1 = case.variance([e[:1] for e in pairs])[0, -1]
-    falls = np.concatenate([_falls(s, e) for s, e in zip(case.sums, pairs, strict=True)])
-    half = stdtrit(max(len(falls) - 1, 1), 0.975) * falls.std(ddof=1) / np.sqrt(len(falls)) if len(falls) > 1 else float("inf")
+    falls = units([_falls(s, e) for s, e in zip(case.sums, pairs, strict=True)])
+    spread = 1 / len(falls)
+    if len(case.sums) < CLUSTERS:  # folds share what they are fitted on, and err together (Nadeau and Bengio 2003, the corrected t)
+        spread += float(np.mean([m.sum() / r.sum() for s in case.sums for r, m in s.splits()]))
+    half = stdtrit(max(len(falls) - 1, 1), 0.975) * falls.std(ddof=1) * np.sqrt(spread) if len(falls) > 1 else float("inf")
     mean, root = float(falls.mean()), float(np.sqrt(v1))
     low, high = (float(np.sign(v) * (np.sqrt(v1 + abs(v)) - root)) for v in (mean - half, mean + half))
     beside = tuple(n for n in members if n != name)
     share = beyond(case.sums, case.weight, name, beside)
-    # SURE is a rate over the catalogue: q holds p until all are known
-    return Candidate(name, status, root, low, high, needed.p, 1 / max(share, 1e-9), needed.trials)
+    return Candidate(name, status, root, low, high, needed.p, float("nan"), 1 / max(share, 1e-9), needed.trials)
 
 
 def _falls(s: Sums, errors: Array) -> Array:
     """Fall of the variance in the equation that is reported [m2], trial by trial.  errors: with and without, (2, E, C)."""
-    count = np.bincount(s.trial, s.count[-1])
-    with_it, lacks = (np.bincount(s.trial, e) / count for e in errors[:, -1])
+    trial = np.unique(s.trial[s.test], return_inverse=True)[1]
+    with_it, lacks = (np.bincount(trial, e[s.test]) / np.bincount(trial, s.count[-1, s.test]) for e in errors[:, -1])
     return np.asarray(lacks - with_it)
 
 

@@ -1,14 +1,14 @@
 """Sets of effects compete in predicting trials left out: what competes, how sets are scored, what each member brings."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtr
+from scipy.special import chdtrc
 
 from plumbline.effects import Effect
-from plumbline.search import Fit, Sums, fit, heldout, residual_variance, solve, subsets
+from plumbline.search import CLUSTERS, Fit, Sums, fit, heldout, residual_variance, solve, subsets
 from plumbline.shapes import BESIDE, SHAPES
 
 Array = NDArray[np.float64]
@@ -62,21 +62,21 @@ class Case:
         """Held-out error of the last equation [m] with some effects and nothing else beside the base.  silent: fitted and not used."""
         return float(np.sqrt(self.variance([heldout(s, self.weight, [s.of(names)], silent=own(s, *silent)) for s in self.sums])[0, -1]))
 
-    def errors(self, sets: Sequence[Set], *, without: str = "") -> list[Array]:
-        """Sum of squares on trials left out of each subject: (S, E, C).
+    def errors(self, sets: Sequence[Set], *, without: str = "") -> Iterator[Array]:
+        """Sum of squares on trials left out of each subject, one after the other: (S, E, C).
 
         without: what is not fitted this time.
         """
-        return [heldout(s, self.weight, [self.columns(s, names, without) for names in sets]) for s in self.sums]
+        return (heldout(s, self.weight, [self.columns(s, names, without) for names in sets]) for s in self.sums)
 
     def with_and_without(self, names: Set, name: str) -> list[Array]:
         """The same for a model and for what is left of it without one of its effects, (2, E, C)."""
         few = tuple(n for n in names if n != name)
         return [heldout(s, self.weight, [self.columns(s, names), self.columns(s, few, without=name)]) for s in self.sums]
 
-    def variance(self, errors: Sequence[Array]) -> Array:
+    def variance(self, errors: Iterable[Array]) -> Array:
         """Pooled held-out variance of each set and equation, (S, E)."""
-        return np.asarray(np.maximum(sum(e.sum(2) for e in errors) / sum(s.count.sum(1) for s in self.sums), 0.0))
+        return np.asarray(np.maximum(sum(e.sum(2) for e in errors) / sum(s.judged for s in self.sums), 0.0))
 
     def inside(self, names: Set) -> Array:
         """Pooled variance at the fits over all trials, (E,)."""
@@ -251,7 +251,7 @@ def search(case: Case) -> tuple[Set, list[Refused]]:
 
 @dataclass(frozen=True)
 class Need:
-    """What an effect brings: fall of the score, p of none, largest fall of an equation's rms as ZMP in units of the whole floor.
+    """What an effect brings: fall of the score, p of no such effect, largest fall of an equation's rms as ZMP in units of the whole floor.
 
     trials: independent trials that find it with 80 % power at 5 %.  lowers: whether the error that is reported falls.
     """
@@ -274,32 +274,37 @@ def need(case: Case, names: Set, name: str) -> Need:
     with_it, lacks = [e[0] for e in pairs], [e[1] for e in pairs]
     v1, v0 = (case.variance([e[None] for e in errors])[0] for errors in (with_it, lacks))
     fall = float(case.score(v0[None])[0] - case.score(v1[None])[0])
-    d = np.concatenate([gains(case, s, a, b) for s, a, b in zip(case.sums, lacks, with_it, strict=True)])
-    n, sd = len(d), float(d.std(ddof=1)) if len(d) > 1 else float("nan")
-    t = d.mean() / (sd / np.sqrt(n) + 1e-300) if n > 1 else 0.0
+    d = units([gains(case, s, a, b) for s, a, b in zip(case.sums, lacks, with_it, strict=True)])
+    sd = float(d.std(ddof=1)) if len(d) > 1 else float("nan")
     # a contact takes the constants with it: without it they would have to be something else
     bare = v0 + (case.constants(tuple(n for n in names if n != name)) if case.placed((name,)) else 0.0)
     fell = (np.sqrt(bare) - np.sqrt(v1)) * case.as_zmp
     noise = case.usual[-1]
     known = noise if np.isfinite(noise) else float(np.sqrt(v1[-1]))
     trials = (2.49 * sd / d.mean()) ** 2 + 1 if d.mean() > 0 else float("inf")  # 2.49 = 1.65 + 0.84 standard errors
-    return Need(fall, float(stdtr(max(n - 1, 1), -t)), float(np.max(fell[case.weight > 0]) / known), float(trials), bool(v1[-1] < v0[-1]))
+    return Need(fall, chance(case, names, name), float(np.max(fell[case.weight > 0]) / known), float(trials), bool(v1[-1] < v0[-1]))
+
+
+def chance(case: Case, names: Set, name: str) -> float:
+    """p of no such effect in a model: of each subject, put together as Fisher did."""
+    each = [case.fit(s, names).chance(s, name) for s in case.sums]
+    return float(chdtrc(2 * len(each), -2 * np.sum(np.log(np.maximum(each, 1e-300)))))
 
 
 def gains(case: Case, s: Sums, lacks: Array, with_it: Array) -> Array:
     """Score that each independent piece gains, as logs: no single piece outvotes the others."""
-    where = label(s)
+    where = np.unique(s.clusters[s.test], return_inverse=True)[1]
     out = np.zeros(where.max() + 1)
     for e in np.flatnonzero(case.weight > 0):
-        count = np.bincount(where, s.count[e])
-        a, b = (np.maximum(np.bincount(where, v[e]) / count, 0.0) + SPARED / case.weight[e] for v in (lacks, with_it))
+        count = np.bincount(where, s.count[e, s.test])
+        a, b = (np.maximum(np.bincount(where, v[e, s.test]) / count, 0.0) + SPARED / case.weight[e] for v in (lacks, with_it))
         out += np.log(a / b)
     return out
 
 
-def label(s: Sums) -> Index:
-    """What is independent: trials; pieces where there are fewer than six trials."""
-    return s.trial if len(s.trials) >= 6 else np.arange(len(s.trial))
+def units(each: Sequence[Array]) -> Array:
+    """What is independent of each other, of all subjects: subjects where there are enough, else what is independent in each."""
+    return np.array([d.mean() for d in each]) if len(each) >= CLUSTERS else np.concatenate(each)
 
 
 def pruned(case: Case, names: Set) -> Set:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from plumbline import evidence, findings
 from plumbline.effects import Catalogue, Effect
 from plumbline.evidence import Weak
+from plumbline.fit import BOTH, NEITHER, TEST, TRAIN
 from plumbline.formulas import formulas, remains
 from plumbline.found import Finding
 from plumbline.library import channels, library
@@ -42,8 +43,9 @@ def of_part(
     for subject in sorted(coverage["subject"].unique()):
         mine = coverage[coverage["subject"] == subject]
         for axis in AXES:
-            got, finding = settled(signals, pushes, mine, effects, evaluation, axis)
-            windows += got
+            every, finding = settled(signals, pushes, mine, effects, evaluation, axis)
+            windows += every
+            got = in_use(every)
             if finding is None:
                 rows.append(findings.unjudged(axis, subject, sizes([got]), too_few([got])))
                 continue
@@ -68,7 +70,7 @@ def of_cohort(
             rows.append(able.assign(subject="all"))
             more.append(tried[(tried["axis"] == axis) & (tried["subject"] == able["subject"].iloc[0])].assign(subject="all"))
         elif len(able):
-            each = [list(evidence.from_table(t[t["axis"] == axis])) for t in (evidence_of[s] for s in able["subject"])]
+            each = OneByOne(evidence_of, able["subject"].tolist(), axis)
             finding = together(each, able["h"].tolist(), plant)
             w2 = float(np.mean([gravity(w) for w in each]))
             most = max((findings.Told(r["follows"], json.loads(r["formulas"])) for _, r in able.iterrows()), key=lambda t: len(t.formulas))
@@ -96,9 +98,17 @@ def sizes(each: Sequence[Sequence[Weak]]) -> tuple[int, int]:
     return sum(map(len, each)), sum(len(np.unique(w.cluster)) for ws in each for w in ws)
 
 
+def in_use(windows: Sequence[Weak]) -> list[Weak]:
+    """Windows of the trials that the config lets models be fitted to or judged on."""
+    return [w for w in windows if w.use != NEITHER]
+
+
 def too_few(each: Sequence[Sequence[Weak]]) -> str:
     """Why some windows cannot be judged, and what is needed; empty where they can."""
     trials, pieces = sizes(each)
+    for use in (TRAIN, TEST):
+        if not any(w.use in (use, BOTH) for ws in each for w in ws):
+            return f"no trial with a CoM and a ZMP is there to {use} on, as evaluation.{use} of the config asks"
     if trials >= TRIALS and pieces >= PIECES:
         return ""
     return (
@@ -119,11 +129,12 @@ def settled(
     h, finding = 0.0, None
     for _ in range(ROUNDS):
         windows = list(evidence.of_part(signals, pushes, coverage, effects, evaluation, undo=out, axis=axis))
-        if too_few([windows]):
+        used = in_use(windows)
+        if too_few([used]):
             return windows, None
-        finding = judge([windows], plant, [gravity(windows)], [h] if h else ())
+        finding = judge([used], plant, [gravity(used)], [h] if h else ())
         before, out = out, _taken(finding, plant)
-        last, h = h or LEANS / gravity(windows), lever(finding, windows)
+        last, h = h or LEANS / gravity(used), lever(finding, used)
         if not _moved(before, out, plant) and abs(h / last - 1) < NEAR:
             break
     return windows, finding
@@ -179,7 +190,7 @@ def _moved(before: Mapping[str, Array], after: Mapping[str, Array], plant: Mappi
 
 
 class Shelf(Mapping[str, pd.DataFrame]):
-    """Rows of `evidence` of one subject at a time, read when they are asked for: memory does not grow with the cohort."""
+    """Rows of `evidence` of one subject at a time, read when they are asked for."""
 
     def __init__(self, files: Sequence[str | Path]) -> None:
         self.where = {str(s): f for f in files for s in read("evidence", f, columns=["subject"])["subject"].unique()}
@@ -193,6 +204,20 @@ class Shelf(Mapping[str, pd.DataFrame]):
 
     def __len__(self) -> int:
         return len(self.where)
+
+
+class OneByOne(Sequence[list[Weak]]):
+    """Windows of each of some subjects on one axis, made when they are asked for: no more than one subject's are ever in memory."""
+
+    def __init__(self, evidence_of: Mapping[str, pd.DataFrame], subjects: Sequence[str], axis: str) -> None:
+        self.evidence_of, self.subjects, self.axis = evidence_of, subjects, axis
+
+    def __getitem__(self, k: Any) -> Any:
+        table = self.evidence_of[self.subjects[k]]
+        return in_use(list(evidence.from_table(table[table["axis"] == self.axis])))
+
+    def __len__(self) -> int:
+        return len(self.subjects)
 
 
 Sizes = dict[str, dict[str, list[float]]]

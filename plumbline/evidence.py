@@ -23,8 +23,10 @@ from numpy.typing import NDArray
 
 from plumbline.effects import Catalogue, Channels, Effect, where
 from plumbline.effects._channels import of_trial
+from plumbline.fit import BOTH, use
 from plumbline.plant import AXES, Plant, of_trials
 from plumbline.shapes import SHAPES
+from plumbline.study import names
 from plumbline.tables import joined
 from plumbline.weak import Bump, white_noise_sd
 
@@ -39,7 +41,8 @@ class Weak:
 
     com, velocity, zmp: bump means.  acceleration: weak x'' [m/s2].  force: Fx/m [m/s2], NaN without shear.  vertical: z'' + g - Fz/m.
     lever: x - p [m].  cluster: number of the independent piece.  terms: effect -> part -> (n, k).  lacking: effect -> what it needs.
-    centre: effect -> coefficients that were taken out of the channels first.  feet: CoP of both plates from the middles of their feet,
+    centre: effect -> coefficients that were taken out of the channels first.  use: of the trial.
+    feet: CoP of both plates from the middles of their feet,
     mean over the trial [m]; NaN where the feet are not known from markers, and for the forward axis.
     noise: sd of the white noise of x, p [m], z [m], Fx, Fz [N]; NaN where not known.  unit: sums of squares of the bump and its curvature.
     """
@@ -66,6 +69,7 @@ class Weak:
     lacking: dict[str, str]
     centre: Mapping[str, Array] = field(default_factory=dict)
     feet: float = float("nan")
+    use: str = BOTH
 
     @property
     def lever(self) -> Array:
@@ -90,7 +94,8 @@ def of_part(
 ) -> Iterator[Weak]:  # fmt: skip
     """Windows of every trial and axis that has a CoM and a ZMP.
 
-    coverage: its rows choose the trials.  undo: effect -> coefficients that are taken out of the channels first (effects with `undo`).
+    coverage: its rows choose the trials; with the column `files` where the config may call them by their files.
+    undo: effect -> coefficients that are taken out of the channels first (effects with `undo`).
     axis: lateral or forward; both where empty.
     """
     chosen = {k: e for k, e in effects.items() if e.ledger == "plant" and e.columns is not None and not e.twin}
@@ -110,7 +115,8 @@ def of_part(
                 channels = effects[name].undo(channels, theta)  # type: ignore[misc]
             made = of_one(about, channels, here, plant, chosen | SHAPES)
             feet = _feet(channels) if here == "lateral" and about["support"] == "markers" else float("nan")
-            yield replace(_without_markers(made) if follows else made, noise=noise, centre=dict(undo or {}), feet=feet)
+            used = use(names(about["trial"], about["task"], str(about.get("files", "")).split(" + ")), evaluation)
+            yield replace(_without_markers(made) if follows else made, noise=noise, centre=dict(undo or {}), feet=feet, use=used)
 
 
 MARKERS = ("sync", "com_bias", "soft_tissue", "offset", "tilt", "gain", "force_scale")
@@ -231,7 +237,7 @@ def _rows(w: Weak) -> pd.DataFrame:
         "trial": w.trial, "subject": w.subject, "task": w.task, "condition": w.condition, "axis": w.axis, "frame": w.frame, "time": w.time,
         "cluster": w.cluster, "com": w.com, "velocity": w.velocity, "zmp": w.zmp, "acceleration": w.acceleration, "force": w.force,
         "vertical": w.vertical, "mass": w.mass, "height": w.height, "rate": b.rate, "half_width": b.half_width, "exponent": b.exponent,
-        **{f"noise_{k}": v for k, v in w.noise.items()}, "feet": w.feet,
+        **{f"noise_{k}": v for k, v in w.noise.items()}, "feet": w.feet, "use": w.use,
         "centre": json.dumps({k: v.tolist() for k, v in w.centre.items()}), "lacking": json.dumps(w.lacking),
     }  # fmt: skip
     for name, parts in w.terms.items():
@@ -260,7 +266,7 @@ def _weak(trial: str, rows: pd.DataFrame, sizes: Mapping[str, int]) -> Weak:
         }
         for name, size in sizes.items() if name not in lacking
     }  # fmt: skip
-    texts = {k: str(first[k]) for k in ("subject", "task", "condition", "axis")}
+    texts = {k: str(first[k]) for k in ("subject", "task", "condition", "axis", "use")}
     arrays = {k: rows[k].to_numpy() for k in ("frame", "time", "cluster", "com", "velocity", "zmp", "acceleration", "force", "vertical")}
     numbers = {k: float(first[k]) for k in ("mass", "height", "feet")}
     made: dict[str, Any] = {"trial": trial, **texts, **arrays, **numbers, "terms": terms, "lacking": lacking}

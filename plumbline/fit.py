@@ -204,14 +204,27 @@ class Named(Protocol):
 
 T = TypeVar("T", bound=Named)
 
+BOTH, TRAIN, TEST, NEITHER = "both", "train", "test", "neither"
+
+
+def use(called: Collection[str], evaluation: Mapping[str, Any]) -> str:
+    """What the config lets a trial be used for: TRAIN, TEST, NEITHER; BOTH, in turn, where it asks for nothing.
+
+    called: what the trial may be called, see `plumbline.study.names`.
+    """
+    train, test = set(evaluation["train"]), set(evaluation["test"])
+    if not train and not test:
+        return BOTH
+    if test & set(called):
+        return TEST
+    return TRAIN if not train or train & set(called) else NEITHER
+
 
 def folds(mine: Sequence[T], evaluation: Mapping[str, Any]) -> Iterator[tuple[int, list[T], list[T]]]:
     """(number, training trials, test trials): eight folds of whole trials (one by one when fewer), or as the config asks."""
     if evaluation["train"] or evaluation["test"]:
-        train = [w for w in mine if not evaluation["train"] or w.names & set(evaluation["train"])]
-        test = [w for w in mine if w.names & set(evaluation["test"])]
-        seen = {w.trial for w in test}
-        yield 0, [w for w in train if w.trial not in seen], test
+        uses = [use(w.names, evaluation) for w in mine]
+        yield 0, [w for w, u in zip(mine, uses, strict=True) if u == TRAIN], [w for w, u in zip(mine, uses, strict=True) if u == TEST]
         return
     number = min(FOLDS, len(mine))
     if number < 2:

@@ -18,7 +18,7 @@ class Found:
     """One effect that the data want.
 
     effect: id, or empty where only the family can be told.  parameters: name -> value and 95 % interval.
-    before, after: held-out error without and with it [m].  p: of no fall.  q: the same, false discovery rate over the catalogue.
+    before, after: held-out error without and with it [m].  p: of no such effect.  q: the same, false discovery rate over the catalogue.
     """
 
     effect: str
@@ -36,7 +36,8 @@ class Candidate:
 
     status: found, settled (fitted always, too small for a name), idle (brings nothing), refused, absorbed, alike (of a family that is
     named) or lacking.  error: held-out error with it beside the final model [m].  low, high: 95 % interval of the fall that it brings [m].
-    vif: variance inflation beside the final model.  trials: that would find such an effect with 80 % power.  reason: in words.
+    p: of no such effect.  q: the same, false discovery rate over the catalogue.  vif: variance inflation beside the final model.
+    trials: that would find such an effect with 80 % power.  reason: in words.
     """
 
     effect: str
@@ -44,6 +45,7 @@ class Candidate:
     error: float = float("nan")
     low: float = float("nan")
     high: float = float("nan")
+    p: float = float("nan")
     q: float = float("nan")
     vif: float = float("nan")
     trials: float = float("nan")

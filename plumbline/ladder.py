@@ -127,20 +127,21 @@ def verdict(said: Said, evaluation: Mapping[str, Any], effects: Mapping[str, Eff
     effects: the catalogue, default the library's.  models: of the config, none for `auto`.
     """
     effects = effects if effects is not None else catalogue()
-    by_axis = {axis: _blocks(said, axis, "all", effects, models) for axis in AXES}
+    model = {axis: _model(said, axis, effects, models) for axis in AXES}
+    by_axis = {axis: _blocks(said, axis, "all", effects, model[axis]) for axis in AXES}
     subjects = sorted(said.coverage["subject"].unique())
     return {
         "schema_version": 1,
         "half_width_s": evaluation["half_width"],
-        "model": _model(said, "lateral", models),
+        "model": model["lateral"],
         **by_axis["lateral"],
         "by_axis": by_axis,
-        "by_subject": {s: _blocks(said, "lateral", s, effects, models) for s in subjects},
+        "by_subject": {s: _blocks(said, "lateral", s, effects, model["lateral"]) for s in subjects},
         "broken_effects": [f"{file}: {error}" for file, error in getattr(effects, "broken", [])],
     }
 
 
-def _model(said: Said, axis: str, models: Models) -> list[str]:
+def _model(said: Said, axis: str, effects: Mapping[str, Effect], models: Models) -> list[str]:
     """Effects of the last model configured; with `auto` those found."""
     if models:
         return list(models[-1][1])
@@ -148,7 +149,7 @@ def _model(said: Said, axis: str, models: Models) -> list[str]:
         (said.candidates["axis"] == axis) & (said.candidates["subject"] == "all") & (said.candidates["status"] == "found")
     ]
     plant = [str(e) for e in found["effect"] if e]
-    control = control_verdict.judge(said.control)["missing"] if axis == "lateral" else None
+    control = _control(said, axis, "all", effects, ())["missing"]
     return [*plant, *(m["effect"] for m in control or [])]
 
 
@@ -158,8 +159,7 @@ def unsettled(judged: pd.DataFrame) -> set[str]:
     return set(mine["subject"])
 
 
-def _blocks(said: Said, axis: str, subject: str, effects: Mapping[str, Effect], models: Models) -> dict[str, Any]:
-    model = _model(said, axis, models)
+def _blocks(said: Said, axis: str, subject: str, effects: Mapping[str, Effect], model: Sequence[str]) -> dict[str, Any]:
     return {"plant": _plant(said, axis, subject, effects, model), "control": _control(said, axis, subject, effects, model)}
 
 

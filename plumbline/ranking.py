@@ -1,20 +1,23 @@
 """What the data say is missing: the set that predicts trials left out, its constants, its families, and what became of every candidate."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtr, stdtrit
 
 from plumbline import outer
-from plumbline.candidates import CONSTANTS, candidates
+from plumbline.candidates import CONSTANTS, candidates, false_discovery_rate
 from plumbline.constants import constants
 from plumbline.contest import FALL, Case, Need, Refused, case_of, constant, need, pruned, search
 from plumbline.effects import Effect
 from plumbline.evidence import Weak
 from plumbline.found import Candidate, Finding, Found, Interval
-from plumbline.search import BASE, Fit, Sums, design, sums
+from plumbline.search import BASE, Fit, Sums, design, on_disk, sums
 from plumbline.shapes import BESIDE, SHAPES
 
 Array = NDArray[np.float64]
@@ -30,38 +33,88 @@ LEANS = 1.1  # [1] h times w2 of a person who stands with an upright trunk, to b
 LOWER = 0.9  # [1] of the error without it, which a constant or a contact must reach
 SHOWS = 0.6  # [1] of what noise and usual faults leave, by which an effect of any motion must lower the rms to be named
 SAME = 0.1  # [1] share of its fall that a member may lose when another effect takes its place, and the data cannot tell them apart
+CHANCE = 0.05  # [1] false discovery rate over the catalogue, below which an effect is named
 ALWAYS = ("ang_mom", "height")  # physics has them in any motion; what they explain is not left, named or not
 
 
 def judge(windows: Sequence[Sequence[Weak]], effects: Mapping[str, Effect], w2: Sequence[float], h: Sequence[float] = ()) -> Finding:
-    """Judge the plant of some subjects on one axis; a contact that no plate measures is found first, and the rest judged beside it.
+    """Judge the plant of some subjects on one axis.
 
     windows: of each subject.  effects: the catalogue.  w2: of each subject, (z'' + g)/z [1/s2].
     h: lever per acceleration of each subject as far as it is known [s2].
     """
+    return _beyond_chance(_beside_contacts(windows, effects, w2, h))
+
+
+def _beyond_chance(finding: Finding) -> Finding:
+    """A finding with the false discovery rate over all that was tested; what may be chance by it is not named."""
+    constants = {(f.effect or ", ".join(f.family)): f.p for f in finding.found}
+    q = false_discovery_rate({c.effect: c.p for c in finding.candidates if np.isfinite(c.p)} | constants)
+    tried = [replace(c, q=q.get(c.effect, float("nan"))) for c in finding.candidates]
+    found = [replace(f, q=q[f.effect or ", ".join(f.family)]) for f in finding.found]
+    chance = {f.effect for f in found if f.q > CHANCE}
+    dropped = [f for f in found if f.effect in chance]
+    final = float(np.sqrt(finding.final**2 + sum(max(f.before**2 - f.after**2, 0.0) for f in dropped)))
+    tried = [
+        replace(c, status="idle", reason=f"may be chance: q = {c.q:.2g} over the catalogue") if c.effect in chance else c for c in tried
+    ]
+    return replace(finding, found=[f for f in found if f.effect not in chance], candidates=tried, final=final)
+
+
+def _beside_contacts(windows: Sequence[Sequence[Weak]], effects: Mapping[str, Effect], w2: Sequence[float], h: Sequence[float]) -> Finding:
+    """A contact that no plate measures is found first, and the rest judged beside it."""
     contacts = [outer.find(ws, float(FAULT * motion([ws], ("kinematic",))[0])) if CONTACT in effects else None for ws in windows]
     if not any(contacts):
         return _judge(windows, effects, w2, h)
-    still = [outer.quiet(ws, c) if c else list(ws) for ws, c in zip(windows, contacts, strict=True)]
-    able = [k for k, ws in enumerate(still) if len(ws) > 1]
+
+    def still(k: int) -> list[Weak]:
+        contact = contacts[k]
+        return outer.quiet(windows[k], contact) if contact else list(windows[k])
+
+    able = [k for k in range(len(windows)) if len(still(k)) > 1]
     if not able:  # nothing to compare with
         return replace(_judge(windows, effects, w2, h), left=("kinematic",))
     h = h or [LEANS / w for w in w2]
-    finding = _judge([still[k] for k in able], effects, [w2[k] for k in able], [h[k] for k in able])
-    told = _with_contact(finding, [windows[k] for k in able], [contacts[k] for k in able], [w2[k] for k in able], [h[k] for k in able])
+    mine = [w2[k] for k in able], [h[k] for k in able]
+    finding = _judge(_Made(lambda i: still(able[i]), len(able)), effects, *mine)
+    told = _with_contact(finding, _Made(lambda i: windows[able[i]], len(able)), [contacts[k] for k in able], *mine)
     return told or _judge(windows, effects, w2, h)
 
 
+@dataclass(frozen=True)
+class _Made(Sequence[Sequence[Weak]]):
+    """Windows of each subject, made when they are asked for."""
+
+    make: Callable[[int], Sequence[Weak]]
+    size: int
+
+    def __len__(self) -> int:
+        return self.size
+
+    def __getitem__(self, k: Any) -> Any:
+        if k >= self.size:
+            raise IndexError(k)
+        return self.make(k)
+
+
 def _judge(windows: Sequence[Sequence[Weak]], effects: Mapping[str, Effect], w2: Sequence[float], h: Sequence[float]) -> Finding:
-    lacking = {k: v for ws in windows for w in ws for k, v in w.lacking.items() if k not in SHAPES}
-    every = {k: e for k, e in {**effects, **SHAPES}.items() if all(k in w.terms for ws in windows for w in ws)}
+    every = {**effects, **SHAPES}
+    lacking: dict[str, str] = {}
+    feet = []
+    for ws in windows:
+        every = {k: e for k, e in every.items() if all(k in w.terms for w in ws)}
+        lacking |= {k: v for w in ws for k, v in w.lacking.items() if k not in SHAPES}
+        feet.append([w.feet for w in ws])
     offered = [k for k in every if k not in CONSTANTS and k != CONTACT]
-    all_sums = [sums(ws, offered, w, k) for ws, w, k in zip(windows, w2, h or [LEANS / w for w in w2], strict=True)]
-    faults = FAULT * motion(windows, all_sums[0].equations)
-    case, absorbed = case_of(all_sums, {**effects, **SHAPES}, offered, faults)
-    best, refused = search(case)
-    members = pruned(case, _plain(case, pruned(case, best)))
-    return _finding(case, members, refused, absorbed, lacking, windows)
+    with TemporaryDirectory() as folder:
+        made = (sums(ws, offered, w, k) for ws, w, k in zip(windows, w2, h or [LEANS / w for w in w2], strict=True))
+        # of several subjects they lie on disk: memory does not grow with the cohort
+        all_sums = [on_disk(s, Path(folder) / str(k)) if len(windows) > 1 else s for k, s in enumerate(made)]
+        faults = FAULT * motion(windows, all_sums[0].equations)
+        case, absorbed = case_of(all_sums, {**effects, **SHAPES}, offered, faults)
+        best, refused = search(case)
+        members = pruned(case, _plain(case, pruned(case, best)))
+        return _finding(case, members, refused, absorbed, lacking, feet)
 
 
 def _plain(case: Case, members: Set) -> Set:
@@ -122,9 +175,9 @@ def _with_contact(
         piece = np.unique(outer.pieces(ws, contact)[np.concatenate(contact.loud)])
         each = [outer.line(ws, contact, rest["moment"], lever, without=int(k)) for k in piece]
         spread.append(np.sqrt((len(each) - 1) * np.var(each, axis=0)))  # jackknife
-        gains += [
-            np.log(np.mean(a[m] ** 2) / np.mean(b[m] ** 2)) for a, b, m in zip(rest["whole"], told, contact.loud, strict=True) if m.any()
-        ]
+        at, acts = outer.pieces(ws, contact), np.concatenate(contact.loud)
+        a, b = np.concatenate(rest["whole"]), np.concatenate(told)
+        gains += [np.log(np.mean(a[m] ** 2) / np.mean(b[m] ** 2)) for m in ((at == k) & acts for k in piece)]
     names = ("force", "x", "lateral", "height")
     values = np.array(lines)
     few = values.std(axis=0, ddof=1) if len(lines) > 2 else np.sqrt(np.mean(np.square(spread), axis=0))
@@ -139,7 +192,7 @@ def _with_contact(
     p = float(stdtr(max(len(gains) - 1, 1), -t))
     push = Found(CONTACT, (CONTACT,), parameters, error[0], error[1], p, p)
     tried = [c for c in finding.candidates if c.effect != CONTACT]
-    mine = Candidate(CONTACT, "found", error[1], q=p)
+    mine = Candidate(CONTACT, "found", error[1], p=p)
     others = [replace(f, before=float(np.sqrt(max(error[1] ** 2 + f.before**2 - f.after**2, 0.0))), after=error[1]) for f in finding.found]
     return replace(finding, found=[push, *others], candidates=sorted([*tried, mine], key=lambda c: c.effect), final=error[1])
 
@@ -156,7 +209,7 @@ def _rest(w: Weak, equation: str, theta: Mapping[str, Array], w2: float, h: floa
 
 def _finding(
     case: Case, members: Set, refused: Sequence[Refused], absorbed: Mapping[str, str], lacking: Mapping[str, str],
-    windows: Sequence[Sequence[Weak]],
+    feet: Sequence[Sequence[float]],
 ) -> Finding:  # fmt: skip
     needs = {n: need(case, members, n) for n in (*members, *case.settled) if n in members or not case.twins[n] & set(members)}
     named = [n for n in (*members, *case.settled) if n in needs and n not in SHAPES and _matters(case, members, n, needs[n])]
@@ -169,8 +222,7 @@ def _finding(
         refused = [*refused, *(Refused((n,), float("nan"), "small beside what nobody explains") for n in doubtful)]
         named = [n for n in named if n not in doubtful]
     whole = len(case.equations) - 1
-    able = not any(k in w.lacking for k in CONSTANTS[:1] for ws in windows for w in ws)
-    kept = constants(case, members, [[w.feet for w in ws] for ws in windows]) if able and not (left or shapes) else []
+    kept = constants(case, members, feet) if CONSTANTS[0] not in lacking and not (left or shapes) else []
     if kept and not _lowered(case, (*members, *named), {c for one in kept for c in one.columns}):
         kept = []
     silent = tuple({"=moment", "=kinematic"} - {c for one in kept for c in one.columns})
@@ -182,18 +234,20 @@ def _finding(
     fits = [case.fit(s, members) for s in case.sums]
     theta = [{n: f.of(s, n)[0] for n in dict.fromkeys(s.columns[c][0] for c in f.columns)} for s, f in zip(case.sums, fits, strict=True)]
     tried = candidates(case, members, found, needs, refused, absorbed, lacking)
-    q = {c.effect: c.q for c in tried}
-    found = [replace(f, q=q.get(f.effect, f.p)) for f in found]
     return Finding(found, shapes, refused, tried, lacking, base, final, float(case.floor[whole]), over, left, theta)
 
 
 def motion(windows: Sequence[Sequence[Weak]], equations: Sequence[str]) -> Array:
     """Rms of what markers measure in each equation, (E,): acceleration of the CoM [m/s2]; its place from the mean and its lever [m]."""
-    x = np.concatenate([np.concatenate([w.com for w in ws]) - np.mean(np.concatenate([w.com for w in ws])) for ws in windows])
-    lever = np.concatenate([w.lever - np.mean(w.lever) for ws in windows for w in ws])
-    a = np.concatenate([w.acceleration for ws in windows for w in ws])
-    size = {"kinematic": float(np.sqrt(np.mean(a**2))), "vertical": 0.0}
-    return np.array([size.get(e, float(np.sqrt(np.mean(x**2) + np.mean(lever**2)))) for e in equations])
+    square, lever, place, count = 0.0, 0.0, 0.0, 0
+    for ws in windows:
+        x = np.concatenate([w.com for w in ws])
+        square += float(sum(w.acceleration @ w.acceleration for w in ws))
+        lever += float(sum(np.sum((w.lever - np.mean(w.lever)) ** 2) for w in ws))
+        place += float(np.sum((x - np.mean(x)) ** 2))
+        count += len(x)
+    size = {"kinematic": float(np.sqrt(square / count)), "vertical": 0.0}
+    return np.array([size.get(e, float(np.sqrt((place + lever) / count))) for e in equations])
 
 
 def _matters(case: Case, members: Set, name: str, needed: Need) -> bool:

@@ -1,18 +1,23 @@
 """Regressions over sets of effects from sums of products, and the search for the set that predicts trials left out."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import fdtrc
 
 from plumbline.evidence import Weak
+from plumbline.fit import BOTH, TEST, TRAIN
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 FOLDS = 8
+CLUSTERS = 6  # trials from which on they are what is independent
 BASE = ("=kinematic", "=moment", "=vertical", "=h")
 """Columns of every model: a constant in each equation, and h = 1/w2 [s2]."""
 
@@ -24,6 +29,7 @@ class Sums:
     equations: their names.  columns: (effect, number) of each of the P columns, base first.  gram (E, C, P, P), right (E, C, P),
     square (E, C), count (E, C): over the windows of piece c in equation e.  trial: index of each piece's trial, (C,).  trials: their ids.
     floor: variance that sensor noise gives, (E, C).  w2, h: with which the columns were made [1/s2], [s2].
+    train, test: pieces that models are fitted on, that they are judged on, (C,); the same, and all, where folds are left out.
     """
 
     equations: tuple[str, ...]
@@ -38,16 +44,31 @@ class Sums:
     w2: float
     mass: float
     h: float
+    train: Mask
+    test: Mask
 
     def of(self, effects: Iterable[str]) -> Index:
         """Columns of the base and of some effects."""
         wanted = {*BASE, *effects}
         return np.flatnonzero([name in wanted for name, _ in self.columns])
 
+    def splits(self) -> Iterator[tuple[Mask, Mask]]:
+        """Pieces to fit on and pieces to judge on: whole trials left out in folds, or once as the config asks."""
+        if not (self.train.all() and self.test.all()):
+            yield self.train, self.test
+            return
+        fold = self.trial % min(FOLDS, len(self.trials))
+        yield from ((fold != f, fold == f) for f in np.unique(fold))
+
     @property
-    def folds(self) -> Index:
-        """Fold of each piece: whole trials."""
-        return self.trial % min(FOLDS, len(self.trials))
+    def judged(self) -> Array:
+        """Windows of each equation that models are judged on, (E,)."""
+        return np.asarray(self.count[:, self.test].sum(1))
+
+    @property
+    def clusters(self) -> Index:
+        """What is independent of each other: trials; pieces where there are fewer than six trials, (C,)."""
+        return self.trial if len(self.trials) >= CLUSTERS else np.arange(len(self.trial))
 
     def error(self, theta: Array, columns: Index, pieces: Array | slice = slice(None)) -> Array:
         """Sum of squares of each equation over some pieces, (E, c), at coefficients of some columns."""
@@ -88,7 +109,17 @@ def sums(windows: Sequence[Weak], effects: Sequence[str], w2: float, h: float = 
     trial = np.array([i for i, _, _ in pieces])
     names = tuple(w.trial for w in windows)
     mass = float(np.mean([w.mass for w in windows]))
-    return Sums(equations, tuple(columns), out["gram"], out["right"], square, count, trial, names, floor, w2, mass, h)
+    train, test = (np.array([w.use in (side, BOTH) for _, w, _ in pieces]) for side in (TRAIN, TEST))
+    return Sums(equations, tuple(columns), out["gram"], out["right"], square, count, trial, names, floor, w2, mass, h, train, test)
+
+
+def on_disk(s: Sums, folder: Path) -> Sums:
+    """The same with its large arrays in files of a new folder, from where they are read as they are needed."""
+    folder.mkdir()
+    names = ("gram", "right")
+    for name in names:
+        np.save(folder / name, getattr(s, name))
+    return replace(s, **{name: np.load(folder / f"{name}.npy", mmap_mode="r") for name in names})
 
 
 def design(w: Weak, equation: str, effects: Sequence[str], w2: float, h: float) -> tuple[Array, Array]:
@@ -137,20 +168,18 @@ def solve(gram: Array, right: Array) -> Array:
 
 
 def heldout(s: Sums, weight: Array, sets: Sequence[Index], silent: Index | None = None) -> Array:
-    """Sum of squares of each set, equation and piece on folds left out, (S, E, C).
+    """Sum of squares of each set, equation and piece on trials left out, (S, E, C); 0 for pieces that are not judged.
 
     weight: of each equation (E,), 0 for those that are only looked at.  sets: columns of each model.  silent: columns that are fitted
     but whose part stays in the residual.
     """
-    fold = s.folds
     gram = np.einsum("e,ecij->cij", weight, s.gram)
     right = np.einsum("e,eci->ci", weight, s.right)
-    out = np.empty((len(sets), len(s.equations), len(s.trial)))
+    out = np.zeros((len(sets), len(s.equations), len(s.trial)))
     by_size: dict[int, list[int]] = {}
     for k, columns in enumerate(sets):
         by_size.setdefault(len(columns), []).append(k)
-    for f in np.unique(fold):
-        mine, rest = fold == f, fold != f
+    for rest, mine in s.splits():
         g, r = gram[rest].sum(0), right[rest].sum(0)
         test_g, test_r = s.gram[:, mine], s.right[:, mine]
         for members in by_size.values():
@@ -168,7 +197,7 @@ def heldout(s: Sums, weight: Array, sets: Sequence[Index], silent: Index | None 
 
 @dataclass(frozen=True)
 class Fit:
-    """Coefficients of some columns over all pieces, their covariance clustered by trial (by piece below six trials), and its clusters."""
+    """Coefficients of some columns, their covariance (jackknife over `Sums.clusters`), and the number of its clusters."""
 
     columns: Index
     theta: Array
@@ -180,22 +209,34 @@ class Fit:
         here = [k for k, c in enumerate(self.columns) if s.columns[c][0] == effect]
         return self.theta[here], self.covariance[np.ix_(here, here)]
 
+    def chance(self, s: Sums, effect: str) -> float:
+        """p of no such effect: Wald's F over the clusters (Hotelling), of all its coefficients together."""
+        theta, covariance = self.of(s, effect)
+        k, rest = len(theta), self.clusters - len(theta)
+        if rest < 1 or not k:
+            return 1.0
+        size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+        z = theta / size
+        wald = float(z @ np.linalg.pinv(covariance / np.outer(size, size), rcond=1e-9, hermitian=True) @ z)
+        return float(fdtrc(k, rest, wald * rest / (k * (self.clusters - 1))))
+
 
 def fit(s: Sums, weight: Array, columns: Index, *, among: NDArray[np.bool_] | None = None, known: Mapping[int, float] | None = None) -> Fit:
     """Weighted least squares.  among: pieces used (mask), None for all.  known: column -> coefficient that is not fitted."""
     if known:
         return _with_known(s, weight, columns, among, known)
-    use = np.ones(len(s.trial), bool) if among is None else among
+    use = s.train if among is None else among
     gram = np.einsum("e,ecij->cij", weight, s.gram[:, use][:, :, columns[:, None], columns])
     right = np.einsum("e,eci->ci", weight, s.right[:, use][:, :, columns])
-    theta = solve(gram.sum(0), right.sum(0))
-    scores = right - gram @ theta
-    label = s.trial[use] if len(s.trials) >= 6 else np.flatnonzero(use)
+    label = s.clusters[use]
     groups = np.unique(label)
-    by_group = np.stack([scores[label == k].sum(0) for k in groups])
-    bread = np.linalg.pinv(gram.sum(0), rcond=1e-14, hermitian=True)
-    factor = len(groups) / max(len(groups) - 1, 1)
-    return Fit(columns, theta, factor * bread @ (by_group.T @ by_group) @ bread, len(groups))
+    g, r = gram.sum(0), right.sum(0)
+    theta = solve(g, r)
+    if len(groups) < 2:
+        return Fit(columns, theta, np.full(g.shape, np.inf), len(groups))
+    # whole clusters left out: with few of them the sandwich of their scores comes out too small
+    without = np.stack([solve(g - gram[label == k].sum(0), r - right[label == k].sum(0)) - theta for k in groups])
+    return Fit(columns, theta, (len(groups) - 1) / len(groups) * without.T @ without, len(groups))
 
 
 def _with_known(s: Sums, weight: Array, columns: Index, among: NDArray[np.bool_] | None, known: Mapping[int, float]) -> Fit:
@@ -212,7 +253,7 @@ def _with_known(s: Sums, weight: Array, columns: Index, among: NDArray[np.bool_]
 
 def residual_variance(s: Sums, weight: Array, columns: Index) -> Array:
     """Variance of each equation at the fit over all pieces, (E,)."""
-    theta = fit(s, weight, columns).theta
+    theta = fit(s, weight, columns, among=s.train | s.test).theta
     return np.asarray(np.maximum(s.error(theta, columns).sum(1), 0.0) / np.maximum(s.count.sum(1), 1))
 
 

@@ -345,6 +345,7 @@ TABLES: dict[str, list[Column]] = {
             )
         ],
         _c("feet", "float", "m", "CoP of both plates from the middles of their feet, mean of the trial"),
+        _c("use", "str", "", "both, train, test or neither, as the config asks"),
         _c("centre", "str", "", "JSON: effect -> coefficients taken out of the channels first"),
         _c("lacking", "str", "", "JSON: effect -> what it needs and the trial lacks"),
     ],

@@ -25,13 +25,13 @@ def criticised(
     effects = effects if effects is not None else catalogue()
     evaluation, listed = config["evaluation"], models(config, effects)
     made: dict[str, Any] = {}
-    made["evidence"], alone, tried = of_part(tables["signals"], tables["pushes"], tables["coverage"], effects, evaluation)
+    coverage = tables["coverage"].merge(tables["trials"][["trial", "files"]], on="trial")
+    made["evidence"], alone, tried = of_part(tables["signals"], tables["pushes"], coverage, effects, evaluation)
     of = dict(tuple(made["evidence"].groupby("subject")))
     made["judged"], made["candidates"] = of_cohort(of, alone, tried, effects)
     faults, others = known(alone, tried, effects)
     stages: dict[str, Any] = {n: tables[n] for n in ("signals", "pushes", "loci", "coverage", "trust", "clusters", "controller")}
     made["control"] = control.of_part(**stages, evaluation=evaluation, corrected=faults, plant=others, effects=effects)
-    coverage = tables["coverage"].merge(tables["trials"][["trial", "files"]], on="trial")
     made["rungs"], _ = rungs.of_part(
         tables["signals"], tables["pushes"], coverage, made["evidence"], made["judged"], made["candidates"], effects, listed, evaluation
     )

@@ -10,6 +10,7 @@ from plumbline.effects import catalogue
 snakemake: Snakemake
 stamp = job.start(snakemake)
 signals, pushes, coverage = (tables.read(n, snakemake.input[n]) for n in ("signals", "pushes", "coverage"))
+coverage = coverage.merge(tables.read("trials", snakemake.input.trials, columns=["trial", "files"]), on="trial")
 effects = catalogue(Path("."))
 for file, error in effects.broken:
     print(f"{file} cannot be used and the others go on: {error}")

@@ -4,6 +4,7 @@ rule evidence:
         signals="results/signals/{part}.parquet",
         coverage="results/coverage/{part}.parquet",
         pushes="results/pushes/{part}.parquet",
+        trials="results/trials/{part}.parquet",
         effects=EFFECTS,
     output:
         evidence="results/evidence/{part}.parquet",
