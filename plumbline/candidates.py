@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from plumbline.contest import Case, Need, Refused, Set, beyond, need, units
+from plumbline.contest import Case, Need, Refused, Set, beyond, gains, need, trials_for, units
 from plumbline.effects import Effect
 from plumbline.found import Candidate, Found
 from plumbline.search import CLUSTERS, Sums
@@ -34,7 +34,7 @@ def candidates(
             status = "found" if name in named else "settled" if name in case.settled else "refused"
             out[name] = _measured(case, members, name, needs[name], status)
         elif name in family:
-            out[name] = Candidate(name, "alike", reason=f"these data cannot tell it from {family[name] or 'the others of its family'}")
+            out[name] = _rival(case, members, name, family[name])
         elif name in absorbed or effect.twin == "w2":
             out[name] = Candidate(name, "absorbed", reason=absorbed.get(name, "a fitted w2 takes all of it"))
         elif name in case.rivals:
@@ -66,6 +66,18 @@ def _measured(case: Case, members: Set, name: str, needed: Need, status: str) ->
     beside = tuple(n for n in members if n != name)
     share = beyond(case.sums, case.weight, name, beside)
     return Candidate(name, status, root, low, high, needed.p, float("nan"), 1 / max(share, 1e-9), needed.trials)
+
+
+def _rival(case: Case, members: Set, name: str, best: str) -> Candidate:
+    """An effect of the family of one that was found: error with it in its place, and how many trials would tell them apart."""
+    out = Candidate(name, "alike", reason=f"these data cannot tell it from {best or 'the others of its family'}")
+    if best not in (*members, *case.settled) or name not in (*case.rivals, *case.settled):
+        return out  # constants, and what no motion tells apart
+    here = (*(n for n in members if n != best), name)
+    mine, other = list(case.errors([members])), list(case.errors([here], without=best))
+    d = units([gains(case, s, b[0], a[0]) for s, a, b in zip(case.sums, mine, other, strict=True)])
+    share = beyond(case.sums, case.weight, name, (*members, best))
+    return replace(out, error=float(np.sqrt(case.variance(other)[0, -1])), vif=1 / max(share, 1e-9), trials=trials_for(case, d))
 
 
 def _falls(s: Sums, errors: Array) -> Array:

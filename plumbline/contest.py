@@ -275,14 +275,12 @@ def need(case: Case, names: Set, name: str) -> Need:
     v1, v0 = (case.variance([e[None] for e in errors])[0] for errors in (with_it, lacks))
     fall = float(case.score(v0[None])[0] - case.score(v1[None])[0])
     d = units([gains(case, s, a, b) for s, a, b in zip(case.sums, lacks, with_it, strict=True)])
-    sd = float(d.std(ddof=1)) if len(d) > 1 else float("nan")
     # a contact takes the constants with it: without it they would have to be something else
     bare = v0 + (case.constants(tuple(n for n in names if n != name)) if case.placed((name,)) else 0.0)
     fell = (np.sqrt(bare) - np.sqrt(v1)) * case.as_zmp
     noise = case.usual[-1]
     known = noise if np.isfinite(noise) else float(np.sqrt(v1[-1]))
-    trials = (2.49 * sd / d.mean()) ** 2 + 1 if d.mean() > 0 else float("inf")  # 2.49 = 1.65 + 0.84 standard errors
-    return Need(fall, chance(case, names, name), float(np.max(fell[case.weight > 0]) / known), float(trials), bool(v1[-1] < v0[-1]))
+    return Need(fall, chance(case, names, name), float(np.max(fell[case.weight > 0]) / known), trials_for(case, d), bool(v1[-1] < v0[-1]))
 
 
 def chance(case: Case, names: Set, name: str) -> float:
@@ -300,6 +298,17 @@ def gains(case: Case, s: Sums, lacks: Array, with_it: Array) -> Array:
         a, b = (np.maximum(np.bincount(where, v[e, s.test]) / count, 0.0) + SPARED / case.weight[e] for v in (lacks, with_it))
         out += np.log(a / b)
     return out
+
+
+def trials_for(case: Case, d: Array) -> float:
+    """Trials like these that show a gain of this mean and spread with 80 % power at 5 %; infinite where it is none.
+
+    d: gain of each unit, see `units`.
+    """
+    if len(d) < 2 or not d.mean() > 0:
+        return float("inf")
+    needed = ((1.645 + 0.842) * d.std(ddof=1) / d.mean()) ** 2 + 1  # standard errors: one-sided 5 %, 80 % power
+    return float(max(needed * sum(len(s.trials) for s in case.sums) / len(d), 2.0))
 
 
 def units(each: Sequence[Array]) -> Array:

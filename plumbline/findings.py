@@ -13,6 +13,8 @@ from plumbline.shapes import SHAPES
 
 Row = dict[str, Any]
 
+MANY = 500  # trials that nobody records
+
 WHERE = {
     "kinematic": "the acceleration of the CoM against the shear force (the kinematic side)",
     "moment": "the ZMP against the shear force (the moment side)",
@@ -100,7 +102,7 @@ def block(about: pd.Series, rows: pd.DataFrame, effects: Mapping[str, Effect], m
         "cannot_judge": {
             r["effect"]: r["reason"].removeprefix("cannot be judged: ") for _, r in rows[rows["status"] == "lacking"].iterrows()
         },
-        "separate": list(_separate(missing, effects)),
+        "separate": list(_separate(missing, rows, effects)),
     }
 
 
@@ -114,12 +116,20 @@ def _entry(row: pd.Series, model: Sequence[str]) -> Row:
     }  # fmt: skip
 
 
-def _separate(missing: Sequence[Row], effects: Mapping[str, Effect]) -> Iterator[str]:
-    """Recordings that would tell the members of each family apart."""
-    for entry in missing:
-        if len(entry["family"]) > 1:
-            ways = dict.fromkeys(effects[k].separated for k in entry["family"] if k in effects and effects[k].separated)
-            yield f"{' or '.join(entry['family'])}: {'; '.join(ways)}"
+def _separate(missing: Sequence[Row], rows: pd.DataFrame, effects: Mapping[str, Effect]) -> Iterator[str]:
+    """What would tell the members of each family apart: another recording, or more trials like these."""
+    about = rows.set_index("effect")
+    for family in dict.fromkeys(tuple(entry["family"]) for entry in missing if len(entry["family"]) > 1):
+        ways = dict.fromkeys(effects[k].separated for k in family if k in effects and effects[k].separated)
+        alike = about.loc[[k for k in family[1:] if k in about.index]].dropna(subset=["vif"])
+        more = "".join(_more_trials(str(k), row) for k, row in alike.iterrows())
+        yield f"{' or '.join(family)}: {'; '.join(ways)}{more}"
+
+
+def _more_trials(effect: str, row: pd.Series) -> str:
+    n = float(row["trials_80"])
+    told = f"about {n:.0f} trials like these" if n < MANY else "no number of trials like these"
+    return f" ({effect}: variance inflation {row['vif']:.3g}; {told} would tell it with 80 % power)"
 
 
 def describe(about: pd.Series) -> str:

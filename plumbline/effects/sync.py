@@ -36,7 +36,7 @@ EFFECT = Effect(
     needs=("com_x", "zmp_x"),
     parameters=(Parameter("delay", "s", -0.2, 0.2, matters=0.003),),
     confounded=("filter",),
-    separated="a tap on a plate with a marker on the hammer; the raw, unfiltered force record",
+    separated="a tap on a plate with a marker on the hammer",
     columns=columns,
     force=force,
     vertical=vertical,
