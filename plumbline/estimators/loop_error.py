@@ -29,7 +29,7 @@ MARGIN = 2.5  # sd of the feedback noise that the law must stay away from a limi
 ROUNDS = 14
 PATIENCE, BEHIND = 3, 1.3  # rounds after which a start that costs so much more than the best is given up
 SETTLED = 1e-4  # share of the cost that a full step promises, below which the search has settled
-BOUNDS = ((-0.3, 0.3), (1.01, 20.0), (0.0, 8.0))  # of d [m], k1 [1], k2 [s]
+BOUNDS = ((-0.3, 0.3), (1.01, 20.0), (0.0, 8.0))  # of d from where the person is [m], k1 [1], k2 [s]
 STEPS = (1e-5, 1e-3, 1e-3)
 
 
@@ -57,10 +57,12 @@ class Candidate:
         """Changes of all parameters for the derivatives."""
         return np.array([*STEPS, *[h for term, _ in self.terms for h in term.steps]])
 
-    @property
-    def bounds(self) -> tuple[Array, Array]:
-        """Least and largest parameters."""
-        return np.array([*[b[0] for b in BOUNDS], *self.low]), np.array([*[b[1] for b in BOUNDS], *self.high])
+    def bounds(self, scene: Scene) -> tuple[Array, Array]:
+        """Least and largest parameters; d is counted from the middle of the measured CoM, not from the laboratory's origin."""
+        middle = float(np.median(scene.batch.x[scene.batch.inside]))
+        low, high = (np.array([*[b[end] for b in BOUNDS], *own]) for end, own in enumerate((self.low, self.high)))
+        low[0], high[0] = low[0] + middle, high[0] + middle
+        return low, high
 
 
 class Fit(NamedTuple):
@@ -154,7 +156,7 @@ def fit(candidate: Candidate, bases: Array, scene: Scene, whiten: Whiten, rounds
     """
     bases = np.atleast_2d(bases)
     theta = np.array([[*b, *s] for b in bases for s in candidate.starts]).T
-    low, high = candidate.bounds
+    low, high = candidate.bounds(scene)
     theta = np.clip(theta, low[:, None], high[:, None])
     now = _Slopes.at(theta, candidate, scene, whiten)
     damp, ready = np.full(theta.shape[1], 1e-3), np.zeros(theta.shape[1], bool)
@@ -225,7 +227,7 @@ def left_out(got: Fit, fold: NDArray[np.int64], scene: Scene, whiten: Whiten) ->
     fold: (m,) numbers.  A parameter that lies at its bound stays there.
     """
     names = np.unique(fold)
-    low, high = got.candidate.bounds
+    low, high = got.candidate.bounds(scene)
     at_low, at_high = (got.theta <= low) | (low == high), got.theta >= high
     low, high = np.where(at_high, high, low), np.where(at_low, low, high)
     rest = [fold != f for f in names]
