@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from plumbline import law as laws
 from plumbline.batch import Batch, slow
 from plumbline.effects import Effect
-from plumbline.effects._channels import Channels, of_trial
+from plumbline.effects._channels import Channels, Person, of_trial, persons
 from plumbline.estimators import saturation
 from plumbline.groups import Group, of_loci
 from plumbline.models.loop import Scene
@@ -67,12 +67,13 @@ def staged(
         return f"{len(mine)} loci of {mine['trial'].nunique()} trials can be simulated; {FEWEST_LOCI} of {FEWEST_TRIALS} are needed"
     raw = signals[signals["trial"].isin(set(mine["trial"]))]
     key = (about["subject"], about["task"], about["condition"])
+    person = persons(signals, coverage)[about["subject"]]
 
     def groups(omega: float, shift: float = 0.0) -> Iterator[tuple[Group | None, pd.DataFrame]]:
         """Loci and signals with the faults taken out; the same as the ZMP alone would have to drive them."""
-        frames = _applied(raw, coverage, known.effects, known.faults, omega, _taken_out)
+        frames = _applied(raw, coverage, person, known.effects, known.faults, omega, _taken_out)
         for sizes in ({}, known.plant):
-            table = _applied(frames, coverage, known.effects, sizes, omega, _driven)
+            table = _applied(frames, coverage, person, known.effects, sizes, omega, _driven)
             yield next(of_loci(table.assign(zmp_x=table["zmp_x"] + shift), pushes, mine, {key: omega}), None), table
 
     omega, shift = float(row["omega"]), 0.0
@@ -150,16 +151,16 @@ Change = Callable[[Channels, Effect, Array], Channels]
 
 
 def _applied(
-    frames: pd.DataFrame, coverage: pd.DataFrame, known: Mapping[str, Effect], sizes: Sizes, omega: float, change: Change
+    frames: pd.DataFrame, coverage: pd.DataFrame, person: Person, known: Mapping[str, Effect], sizes: Sizes, omega: float, change: Change
 ) -> pd.DataFrame:
-    """Signals with the lateral CoM and ZMP changed by effects of known sizes."""
+    """Signals of one subject with the lateral CoM and ZMP changed by effects of known sizes."""
     if not sizes:
         return frames
     mass = dict(zip(coverage["trial"], coverage["mass"], strict=True))
     names = sorted(set(sizes) & set(known))
     pieces = []
     for trial, one in frames.groupby("trial", sort=False, observed=True):
-        channels = replace(of_trial(one, "lateral", float(mass.get(trial, np.nan))), w2=omega**2)
+        channels = replace(of_trial(one, "lateral", float(mass.get(trial, np.nan)), person), w2=omega**2)
         for name in names:
             channels = change(channels, known[name], np.asarray(sizes[name], float))
         pieces.append(one.assign(com_x=channels["com_x"], zmp_x=channels["zmp_x"]))

@@ -22,7 +22,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from plumbline.effects import Catalogue, Channels, Effect, where
-from plumbline.effects._channels import of_trial
+from plumbline.effects._channels import of_trial, persons
 from plumbline.fit import BOTH, use
 from plumbline.plant import AXES, Plant, of_trials
 from plumbline.shapes import SHAPES
@@ -101,12 +101,10 @@ def of_part(
     chosen = {k: e for k, e in effects.items() if e.ledger == "plant" and e.columns is not None and not e.twin}
     settings: dict[str, Any] = {k: evaluation[k] for k in ("half_width", "exponent")}
     settings["axes"] = (axis,) if axis else tuple(AXES)
-    heights = coverage.groupby("subject", observed=True)["height_com"].mean()
-    middles = signals.groupby("subject", observed=True)[["zmp_x", "zmp_y"]].mean()
+    who = persons(signals, coverage)
     for about, frames, plants in of_trials(signals, pushes, coverage, **settings):
         for here, plant in plants.items():
-            channels = of_trial(frames, here, float(about["mass"]), heights[about["subject"]])
-            channels = replace(channels, middle=float(middles.loc[about["subject"], f"zmp_{AXES[here]}"]))
+            channels = of_trial(frames, here, float(about["mass"]), who[about["subject"]])
             follows = about["com_method"] == "force"
             if follows:  # the CoM was made from the shear: it has nothing to say against it
                 channels = channels.changed(grf_x=np.full(len(channels.time), np.nan), grf_y=np.full(len(channels.time), np.nan))

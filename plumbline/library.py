@@ -1,16 +1,16 @@
 """Candidate terms of what a residual may look like: bump means of functions of the channels, nothing differentiated twice."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from plumbline.effects import Channels, Effect
-from plumbline.effects._channels import of_trial
+from plumbline.effects._channels import of_trial, persons
 from plumbline.evidence import Weak
-from plumbline.plant import AXES, rows_of
+from plumbline.plant import rows_of
 from plumbline.weak import Bump
 
 Array = NDArray[np.float64]
@@ -41,10 +41,9 @@ def channels(
 ) -> Iterator[tuple[Channels, Weak]]:
     """The channels that windows were made from, what was taken out of them taken out again; trial by trial."""
     rows = signals.groupby("trial", observed=True).indices
-    heights = coverage.groupby("subject", observed=True)["height_com"].mean()
+    who = persons(signals, coverage)
     for w in windows:
-        c = of_trial(rows_of(signals, rows[w.trial]), w.axis, w.mass, heights[w.subject])
-        c = replace(c, middle=float(np.nanmean(signals.loc[signals["subject"] == w.subject, f"zmp_{AXES[w.axis]}"])))
+        c = of_trial(rows_of(signals, rows[w.trial]), w.axis, w.mass, who[w.subject])
         for name, theta in w.centre.items():
             c = effects[name].undo(c, theta)  # type: ignore[misc]
         yield c, w

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from plumbline import evidence, outer
 from plumbline.contest import decisive, own, tolerance
 from plumbline.effects import Catalogue, Channels
-from plumbline.effects._channels import of_trial
+from plumbline.effects._channels import of_trial, persons
 from plumbline.evidence import Weak
 from plumbline.fit import folds, free_runs
 from plumbline.physics import G
@@ -98,9 +98,9 @@ def _plants(
     signals: pd.DataFrame, pushes: pd.DataFrame, coverage: pd.DataFrame, axis: str, evaluation: Mapping[str, Any]
 ) -> dict[str, _Motion]:  # fmt: skip
     settings: dict[str, Any] = {k: evaluation[k] for k in ("half_width", "exponent")}
-    height = float(coverage["height_com"].mean())
+    who = persons(signals, coverage)
     return {
-        str(about["trial"]): _Motion(of_trial(frames, axis, float(about["mass"]), height), plants[axis])
+        str(about["trial"]): _Motion(of_trial(frames, axis, float(about["mass"]), who[about["subject"]]), plants[axis])
         for about, frames, plants in of_trials(signals, pushes, coverage, **settings, axes=(axis,))
         if axis in plants
     }

@@ -85,7 +85,7 @@ def tabled(
                 "locus": 1, "start": 0.0, "end": one.time[-1], "start_frame": 0, "end_frame": len(one.time) - 1, "kind": kind,
                 "side": one.side, "source": "event", "reference": 0.0,
             })  # fmt: skip
-            about.append(key | {"com_method": "lab", "filtered_before": False, "mass": 70.0, "files": ""})
+            about.append(key | {"com_method": "lab", "filtered_before": False, "mass": 70.0, "height_com": 9.81 / omega**2, "files": ""})
             trials.append({"trial": key["trial"], "events": "[]"})
     pushes = tables.empty("pushes")
     return pd.concat(frames, ignore_index=True), pushes, pd.DataFrame(loci), pd.DataFrame(about), pd.DataFrame(trials)

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from plumbline.effects import Channels, Effect, Parameter, catalogue
-from plumbline.effects._channels import derivative, of_trial
+from plumbline.effects._channels import Person, derivative, of_trial
 
 PLANT = {k: e for k, e in catalogue().items() if e.ledger == "plant"}
 OWN = """
@@ -132,7 +132,8 @@ def test_channels_of_both_axes_have_the_same_sense_of_rotation() -> None:
     frames = pd.DataFrame({"time": 5.0 + np.arange(n) / 10})
     for k, name in enumerate(["com_x", "com_y", "com_z", "zmp_x", "zmp_y", "zmp_z", "ang_mom_x", "ang_mom_y", "ang_mom_z"]):
         frames[name] = float(k)
-    lateral, forward = of_trial(frames, "lateral", 70.0), of_trial(frames, "forward", 70.0)
+    person = Person(1.0, {"lateral": 0.0, "forward": 0.0})
+    lateral, forward = (of_trial(frames, axis, 70.0, person) for axis in ("lateral", "forward"))
     assert (lateral.com_x[0], forward.com_x[0]) == (0.0, 1.0)
     assert (lateral.ang_mom[0], forward.ang_mom[0]) == (7.0, -6.0)
     assert lateral.com_z[0] == 2.0 - 5.0

@@ -18,14 +18,34 @@ AXIS = {"lateral": ("x", "y"), "forward": ("y", "x")}
 
 
 @dataclass(frozen=True)
+class Person:
+    """Where a person is, one for all trials.
+
+    height: of the CoM over the plates, mean of the trials [m], NaN where not known.  middle: axis -> mean of the ZMP of all trials [m].
+    """
+
+    height: float
+    middle: Mapping[str, float]
+
+
+def persons(signals: pd.DataFrame, coverage: pd.DataFrame) -> dict[str, Person]:
+    """subject -> Person.  signals: all trials of each.  coverage: its rows give the heights, so the same rows must go to every stage."""
+    heights = coverage.groupby("subject", observed=True)["height_com"].mean()
+    middles = signals.groupby("subject", observed=True)[[f"zmp_{here}" for here, _ in AXIS.values()]].mean()
+    return {
+        str(subject): Person(float(heights.get(subject, np.nan)), dict(zip(AXIS, map(float, row), strict=True)))
+        for subject, *row in middles.itertuples()
+    }
+
+
+@dataclass(frozen=True)
 class Channels:
     """One trial, one axis; arrays (n,) at the rate of the frames, NaN where not recorded.
 
     Along the axis that is judged: com_x, zmp_x, grf_x, ang_mom (about the CoM, positive turning +z towards +x); com_z (above the
     plates), grf_z, time (from the trial's start), and every other column of `signals` by its own name, x for the axis and y for the
     other. `_dot` and `_ddot` behind any name are time derivatives (central differences: the weak form averages them). w2: of the base
-    model [1/s2]; mass [kg]; rate [Hz]; height: of the CoM, one for all trials of a person [m]; middle: where
-    the person stands along the axis, the mean of the ZMP of all trials [m]; g.
+    model [1/s2]; mass [kg]; rate [Hz]; height: of the person's CoM [m]; middle: where the person stands along the axis [m]; g.
     """
 
     values: Mapping[str, Array]
@@ -72,10 +92,10 @@ class Channels:
         return self.changed(**{k: np.interp(at, np.arange(n), self.values[k], np.nan, np.nan) for k in names if self.has(k)})
 
 
-def of_trial(frames: pd.DataFrame, axis: str, mass: float, height: float = float("nan")) -> Channels:
+def of_trial(frames: pd.DataFrame, axis: str, mass: float, person: Person) -> Channels:
     """Channels of one trial.  frames: its rows of `signals`.  axis: lateral or forward.  mass [kg].
 
-    height: of the CoM over the plates, mean of the person's trials [m]; of this one where not given.
+    person: whose trial it is; a height that is not known is that of this trial.
     """
     here, other = AXIS[axis]
     swap = {f"_{here}": "_x", f"_{other}": "_y"}
@@ -89,7 +109,7 @@ def of_trial(frames: pd.DataFrame, axis: str, mass: float, height: float = float
     out["time"] = out["time"] - out["time"][:1]
     rate = (len(frames) - 1) / float(np.ptp(out["time"])) if len(frames) > 1 else float("nan")
     own = float(np.nanmean(out["com_z"])) if np.isfinite(out["com_z"]).any() else float("nan")
-    return Channels(out, rate, mass, height if np.isfinite(height) else own)
+    return Channels(out, rate, mass, person.height if np.isfinite(person.height) else own, middle=person.middle[axis])
 
 
 def derivative(values: Array, rate: float, order: int) -> Array:
