@@ -17,16 +17,14 @@ from plumbline import law as laws
 from plumbline import mixture, tables
 from plumbline.estimators.clustered import reach
 from plumbline.fit import Windows, solve, windows
-from plumbline.groups import Group, of_loci
+from plumbline.groups import Group, Key, by_group, of_loci, regimes
 from plumbline.models.com_zmp import PlantFit
 from plumbline.models.controller import Law, poles
 
 Array = NDArray[np.float64]
-Key = tuple[str, str, str]
 
 FEWEST = 3  # loci behind gains
 SURE = 0.95  # [1] share of a cluster from which on a locus counts in its omega and gains: a short fall has a wide se, but a long lever
-REGIMES = {"left": -1, "inside": 0, "right": 1}
 
 
 def of_part(
@@ -42,9 +40,8 @@ def of_part(
     choices: list[dict[str, Any]] = []
     rows: list[dict[str, Any]] = []
     of_group = group_windows(signals, pushes, loci, coverage, evaluation)
-    for key, mine in loci.groupby(["subject", "task", "condition"], sort=True, observed=True):
-        about = dict(zip(("subject", "task", "condition"), map(str, key), strict=True))
-        weak = of_group.get((about["subject"], about["task"], about["condition"]), [])
+    for key, mine in by_group(loci):
+        about, weak = key._asdict(), of_group.get(key, [])
         table, choice = _clustered(mine, weak)
         choices += [about | c for c in choice]
         rows += list(_controllers(about, table, weak, signals, pushes, mine, trust))
@@ -64,7 +61,7 @@ def group_windows(
     mine = signals[signals["trial"].isin(chosen)]
     out: dict[Key, list[Windows]] = {}
     for w in windows(mine, pushes, loci, coverage[coverage["trial"].isin(chosen)], evaluation, axes=("lateral",)):
-        out.setdefault((w.subject, w.task, w.condition), []).append(w)
+        out.setdefault(Key(w.subject, w.task, w.condition), []).append(w)
     return out
 
 
@@ -143,10 +140,10 @@ def _controllers(
     """Rows of `controller` for one group; sets `gains` and `note` in `table`."""
     table.loc[table["kind"] == "falling", "note"] = "falls: its ZMP only shows the limit"
     numbers = sorted(set(table["cluster"]) - {0})
-    key = (about["subject"], about["task"], about["condition"])
+    key = Key(**about)
     pooled = plant_of(weak)
     everybody = next(of_loci(signals, pushes, loci, {key: pooled.omega}), None) if pooled is not None and pooled.w2 > 0 else None
-    regime = _regimes(everybody, trust)
+    regime = regimes(everybody, trust) if everybody is not None else None
     known = laws.limits(everybody.batch, regime) if everybody is not None and regime is not None else None
     for cluster in numbers if len(numbers) > 1 else [0]:  # gains over loci of several omegas are nobody's
         mine = table if cluster == 0 else table[table["cluster"] == cluster]
@@ -159,7 +156,8 @@ def _controllers(
             continue
         wanted = loci.merge(mine[["trial", "locus"]], on=["trial", "locus"])
         group = next(of_loci(signals, pushes, wanted, {key: plant.omega}), None)
-        rows = list(_rows(about | {"cluster": cluster}, plant, group, _regimes(group, trust), known))
+        regime = regimes(group, trust) if group is not None else None
+        rows = list(_rows(about | {"cluster": cluster}, plant, group, regime, known))
         _note(table, mine.index, group, identified=len(rows) > 1)
         yield from rows
     between = ~table["gains"] & (table["note"] == "") & (table["share"] < SURE)
@@ -178,22 +176,6 @@ def _note(table: pd.DataFrame, mine: pd.Index, group: Group | None, *, identifie
     short = [(group.loci.iloc[j], why) for j, why in enumerate(group.shortened) if why]
     for locus, why in [*group.left_out, *short]:
         table.loc[(table["trial"] == locus["trial"]) & (table["locus"] == locus["locus"]), "note"] = why
-
-
-def _regimes(group: Group | None, trust: pd.DataFrame) -> NDArray[np.int8] | None:
-    """Regime of each frame of a group's batch, from the table `trust`; None where a locus has no regimes."""
-    if group is None:
-        return None
-    out = np.zeros(group.batch.x.shape, np.int8)
-    parts = dict(tuple(trust.groupby(["trial", "locus"], observed=True)))
-    for j, (trial, locus) in enumerate(zip(group.loci["trial"], group.loci["locus"], strict=True)):
-        mine = parts.get((trial, locus))
-        if mine is None:
-            return None
-        time = group.starts[j] + (np.arange(len(out)) - group.batch.lead) / group.batch.rate
-        part = np.searchsorted(mine["start"].to_numpy(), time + 1e-9, side="right") - 1
-        out[:, j] = mine["regime"].map(REGIMES).to_numpy()[np.maximum(part, 0)]
-    return out
 
 
 def _blank(about: dict[str, Any]) -> dict[str, Any]:

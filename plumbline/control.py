@@ -22,6 +22,7 @@ from plumbline.effects import HERE as LIBRARY
 from plumbline.effects import Effect, catalogue, where
 from plumbline.estimators import loop_error
 from plumbline.estimators.loop_error import Candidate, Criterion, Fit
+from plumbline.groups import by_group
 from plumbline.models.loop import Scene, Term, simulate
 from plumbline.tables import TABLES
 
@@ -66,10 +67,9 @@ def of_part(
     known = {k: e for k, e in every.items() if e.ledger == "control" and e.law}
     rows: list[dict[str, Any]] = []
     lateral = loci[loci["task"] == TASK]
-    for key, mine in lateral.groupby(["subject", "task", "condition"], sort=True, observed=True):
-        subject, task, condition = map(str, key)
-        about = {"subject": subject, "task": task, "condition": condition}
-        settled = Known(dict((corrected or {}).get(subject, {})), dict((plant or {}).get(subject, {})), every)
+    for key, mine in by_group(lateral):
+        about = key._asdict()
+        settled = Known(dict((corrected or {}).get(key.subject, {})), dict((plant or {}).get(key.subject, {})), every)
         found = staged(about, mine, signals, pushes, coverage, trust, clusters, controller, settled)
         if isinstance(found, str):
             rows.append(blank() | about | {"reason": found})

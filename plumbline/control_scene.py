@@ -13,7 +13,7 @@ from plumbline.batch import Batch, slow
 from plumbline.effects import Effect
 from plumbline.effects._channels import Channels, Person, of_trial, persons
 from plumbline.estimators import saturation
-from plumbline.groups import Group, of_loci
+from plumbline.groups import Group, Key, of_loci, regimes
 from plumbline.models.loop import Scene
 from plumbline.plant import rows_of, sampling_rate
 from plumbline.weak import Bump
@@ -28,7 +28,6 @@ LATE = 0.1  # [s]
 HALF_WIDTH, EXPONENT = 0.3, 4  # of the bumps that omega is fitted with again [s]
 REFITS = 2  # what an effect takes off the ZMP depends on omega
 BEND = 5.0  # [Hz] smoother of what else moves the body: L' is made of unfiltered markers
-REGIMES = {"left": -1, "inside": 0, "right": 1}
 
 
 class Stage(NamedTuple):
@@ -66,7 +65,7 @@ def staged(
     if len(mine) < FEWEST_LOCI or mine["trial"].nunique() < FEWEST_TRIALS:
         return f"{len(mine)} loci of {mine['trial'].nunique()} trials can be simulated; {FEWEST_LOCI} of {FEWEST_TRIALS} are needed"
     raw = signals[signals["trial"].isin(set(mine["trial"]))]
-    key = (about["subject"], about["task"], about["condition"])
+    key = Key(**about)
     person = persons(signals, coverage)[about["subject"]]
 
     def groups(omega: float, shift: float = 0.0) -> Iterator[tuple[Group | None, pd.DataFrame]]:
@@ -182,7 +181,7 @@ def _driven(c: Channels, effect: Effect, theta: Array) -> Channels:
 def _with_base(group: Group, frames: pd.DataFrame, trust: pd.DataFrame | None, row: "pd.Series[Any]", omega: float) -> Stage | str:
     """The stage from a group's batch.  trust: for its regimes; None to find them anew."""
     steady = group.steady
-    regime = _regimes(group, trust) if trust is not None else None
+    regime = regimes(group, trust) if trust is not None else None
     if regime is None:
         found = laws.regimes(group.batch, omega, steady)
         if found is None:
@@ -230,20 +229,6 @@ def _late(scene: Scene, base: Array) -> Array:
     if solved is None or solved[1] <= 1.05:
         return base
     return np.array([solved[0] / (1 - solved[1]), solved[1], solved[2]])
-
-
-def _regimes(group: Group, trust: pd.DataFrame) -> NDArray[np.int8] | None:
-    """Regime of each frame of a group's batch, from the table `trust`; None where a locus has none."""
-    out = np.zeros(group.batch.x.shape, np.int8)
-    parts = dict(tuple(trust.groupby(["trial", "locus"], observed=True)))
-    for j, (trial, locus) in enumerate(zip(group.loci["trial"], group.loci["locus"], strict=True)):
-        mine = parts.get((trial, locus))
-        if mine is None:
-            return None
-        time = group.starts[j] + (np.arange(len(out)) - group.batch.lead) / group.batch.rate
-        part = np.searchsorted(mine["start"].to_numpy(), time + 1e-9, side="right") - 1
-        out[:, j] = mine["regime"].map(REGIMES).to_numpy()[np.maximum(part, 0)]
-    return out
 
 
 def _begun(group: Group, frames: pd.DataFrame) -> tuple[Array, Array]:

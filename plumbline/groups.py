@@ -1,8 +1,8 @@
 """Loci of one subject, task and condition as a batch for the identification of the controller."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -18,6 +18,15 @@ HORIZON = 5.0  # [s] of a locus that is used: later the person sways, and noise 
 SHORTEST = 0.3  # [s] of a locus without a gap
 FASTEST = 200.0  # [Hz] to which faster recordings are interpolated
 PAST_BEND = 6.0  # [Hz] smoother of the motion before a locus, in which somebody may push
+REGIMES = {"left": -1, "inside": 0, "right": 1}  # at the left limit, at none, at the right one
+
+
+class Key(NamedTuple):
+    """What makes a group."""
+
+    subject: str
+    task: str
+    condition: str
 
 
 @dataclass(frozen=True)
@@ -43,20 +52,39 @@ class Group:
         return (self.loci["kind"] != "falling").to_numpy()
 
 
-def of_loci(signals: pd.DataFrame, pushes: pd.DataFrame, loci: pd.DataFrame, omega: dict[tuple[str, str, str], float]) -> Iterator[Group]:
+def by_group(loci: pd.DataFrame) -> Iterator[tuple[Key, pd.DataFrame]]:
+    """Rows of `loci`, or of another table with a subject, task and condition, group by group in the order of their names."""
+    for key, mine in loci.groupby(list(Key._fields), sort=True, observed=True):
+        yield Key(*map(str, key)), mine
+
+
+def of_loci(signals: pd.DataFrame, pushes: pd.DataFrame, loci: pd.DataFrame, omega: Mapping[Key, float]) -> Iterator[Group]:
     """Groups of whole subjects.
 
     signals, pushes, loci: tables; a locus is used from PUSH_MARGIN after the push that it follows.
-    omega: (subject, task, condition) -> natural frequency that smooths its loci [rad/s]; groups without one are left out.
+    omega: natural frequency that smooths a group's loci [rad/s]; groups without one are left out.
     """
     rows = signals.groupby("trial", sort=True, observed=True).indices
-    for (subject, task, condition), mine in loci.groupby(["subject", "task", "condition"], sort=True, observed=True):
-        key = (str(subject), str(task), str(condition))
+    for key, mine in by_group(loci):
         if key in omega:
             frames = {trial: rows_of(signals, rows[trial]) for trial in mine["trial"].unique() if trial in rows}
             group = _group(key, mine, _first_used(mine, pushes), frames, omega[key])
             if group is not None:
                 yield group
+
+
+def regimes(group: Group, trust: pd.DataFrame) -> NDArray[np.int8] | None:
+    """REGIMES of each frame of a group's batch, (n, m), from the table `trust`; None where a locus has none there."""
+    out = np.zeros(group.batch.x.shape, np.int8)
+    parts = dict(tuple(trust.groupby(["trial", "locus"], observed=True)))
+    for j, (trial, locus) in enumerate(zip(group.loci["trial"], group.loci["locus"], strict=True)):
+        mine = parts.get((trial, locus))
+        if mine is None:
+            return None
+        time = group.starts[j] + (np.arange(len(out)) - group.batch.lead) / group.batch.rate
+        part = np.searchsorted(mine["start"].to_numpy(), time + 1e-9, side="right") - 1
+        out[:, j] = mine["regime"].map(REGIMES).to_numpy()[np.maximum(part, 0)]
+    return out
 
 
 def _first_used(loci: pd.DataFrame, pushes: pd.DataFrame) -> Array:
@@ -69,7 +97,7 @@ def _first_used(loci: pd.DataFrame, pushes: pd.DataFrame) -> Array:
     return out
 
 
-def _group(key: tuple[str, str, str], loci: pd.DataFrame, start: Array, frames: dict[Any, pd.DataFrame], omega: float) -> Group | None:
+def _group(key: Key, loci: pd.DataFrame, start: Array, frames: dict[Any, pd.DataFrame], omega: float) -> Group | None:
     motions = {trial: _Motion.of(table) for trial, table in frames.items()}
     if not motions:
         return None

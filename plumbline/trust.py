@@ -27,7 +27,7 @@ from plumbline import law as laws
 from plumbline import rls, tables
 from plumbline.batch import Batch
 from plumbline.clusters import group_windows, plant_of
-from plumbline.groups import Group, of_loci
+from plumbline.groups import Group, Key, of_loci
 from plumbline.models.controller import Law
 from plumbline.plant import SIGNALS, rows_of
 from plumbline.switching import Noise, Regime
@@ -66,14 +66,15 @@ def of_part(
     omega = {key: plant.omega for key, plant in plants.items() if plant is not None and plant.w2 > 0}
     parts, traces = [], []
     for group in of_loci(signals, pushes, loci, omega):
-        found = laws.regimes(group.batch, omega[(group.subject, group.task, group.condition)], group.steady)
+        key = Key(group.subject, group.task, group.condition)
+        found = laws.regimes(group.batch, omega[key], group.steady)
         if found is None:
             continue
         passes = Passes.of(group.batch, found.saturation.law, found.noise, group.loci["kind"].to_numpy() == "falling")
         for j in range(len(group.loci)):
             locus = group.loci.iloc[j]
             parts += _parts(group, j, found.regime, passes.switch[j], marks.get(locus["trial"], []))
-        plant = plants[(group.subject, group.task, group.condition)]
+        plant = plants[key]
         traces.append(_traces(group, passes, signals, plant.constant / plant.w2 if plant else 0.0))
     table = pd.DataFrame(parts)[[c.name for c in tables.TABLES["trust"]]] if parts else tables.empty("trust")
     return table, tables.joined("rls", traces)
