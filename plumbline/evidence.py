@@ -12,7 +12,7 @@ windows are all that the search needs.
 """
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -115,6 +115,11 @@ def of_part(
             feet = _feet(channels) if here == "lateral" and about["support"] == "markers" else float("nan")
             used = use(names(about["trial"], about["task"], str(about.get("files", "")).split(" + ")), evaluation)
             yield replace(_without_markers(made) if follows else made, noise=noise, centre=dict(undo or {}), feet=feet, use=used)
+
+
+def split(values: Array, windows: Sequence[Weak]) -> list[Array]:
+    """Values of all windows (N, ...), trial by trial."""
+    return np.split(values, np.cumsum([len(w.time) for w in windows])[:-1])
 
 
 MARKERS = ("sync", "com_bias", "soft_tissue", "offset", "tilt", "gain", "force_scale")

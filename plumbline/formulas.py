@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
-from plumbline.evidence import Weak
+from plumbline.evidence import Weak, split
 from plumbline.library import Library, cost, fits, line
 from plumbline.search import FOLDS, design
 
@@ -73,11 +73,6 @@ def _coefficients(a: Array, y: Array) -> Array:
     scale = np.sqrt(np.mean(a**2, axis=0)) + 1e-300
     solved = np.linalg.lstsq(a / scale, y, rcond=1e-10)[0]
     return np.asarray((solved.T / scale).T)
-
-
-def split(values: Array, windows: Sequence[Weak]) -> list[Array]:
-    """Rows of all windows (N, ...) by trial."""
-    return np.split(values, np.cumsum([len(w.time) for w in windows])[:-1])
 
 
 def projected(values: Array, windows: Sequence[Weak], beside: Sequence[Array] | None) -> Array:

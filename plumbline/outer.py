@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from plumbline.evidence import Weak
+from plumbline.evidence import Weak, split
 from plumbline.physics import G
 
 Array = NDArray[np.float64]
@@ -187,11 +187,6 @@ def explained(windows: Sequence[Weak], contact: Contact, rest: Sequence[Array]) 
             theta, *_ = np.linalg.lstsq(a[others], y[others], rcond=None)
             out[mine] = y[mine] - a[mine] @ theta
     return split(out, windows)
-
-
-def split(values: Array, windows: Sequence[Weak]) -> list[Array]:
-    """Values of all windows, trial by trial."""
-    return np.split(values, np.cumsum([len(w.time) for w in windows])[:-1])
 
 
 def pieces(windows: Sequence[Weak], contact: Contact) -> NDArray[np.int64]:

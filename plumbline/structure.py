@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtr
 
-from plumbline.evidence import Weak
-from plumbline.formulas import offered, projected, split
+from plumbline.evidence import Weak, split
+from plumbline.formulas import offered, projected
 from plumbline.library import Library
 
 Array = NDArray[np.float64]
