@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.axes import Axes
+from matplotlib.cbook import is_math_text
 from matplotlib.colors import same_color
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -171,10 +172,16 @@ def test_axis_that_does_not_fall() -> None:
 
 
 def test_odd_names(tmp_path: Path) -> None:
-    """Dollar signs, underscores and angle brackets in file names start no formula and break no file."""
-    made = made_tables.study(trials=3, names="$x_{1$<b>&")
+    """Dollar signs, underscores and angle brackets in file names start no formula and break no file: they are drawn as they are."""
+    odd = "$x_{1$<b>&"
+    made = made_tables.study(trials=3, names=odd)
     for name in ("signals", "trust", "residuals"):
-        ET.fromstring(drawn(DRAW[name](made), tmp_path / f"{name}.svg"))
+        figure = DRAW[name](made)
+        said = [t.get_text() for t in figure.findobj(Text) if "x_{1" in t.get_text()]
+        assert said
+        assert all(odd in s.replace(r"\$", "$") for s in said)
+        assert not any(is_math_text(s) for s in said)
+        assert ET.fromstring(drawn(figure, tmp_path / f"{name}.svg")).tag.endswith("svg")
 
 
 # -- what is shown ----------------------------------------------------------------------------------------------------

@@ -92,7 +92,9 @@ def test_units_of_points_and_moments_are_independent(tmp_path: Path, length: str
         ANALOG={"UNITS": units},
         POINT=point,
     )
-    check(c3d.read(path).plates[0])
+    raw = c3d.read(path)
+    check(raw.plates[0])
+    np.testing.assert_allclose(raw.points, BODY / 1e3, atol=1e-6)  # metres, whatever the moments' unit
 
 
 def test_moments_in_another_unit_than_stated_are_found_by_the_centre_of_pressure(tmp_path: Path) -> None:
@@ -124,6 +126,8 @@ def test_plate_stands_anywhere_in_the_lab(tmp_path: Path) -> None:
     corners = tilt @ turn @ np.asarray(PLATE["CORNERS"])[:, :, 0] + np.array([[900.0], [0], [-300]])
     plate = read(tmp_path, sensors(2), plate={"CORNERS": corners[:, :, None]}).plates[0]
     check(plate, tilt @ turn @ AXES, (0.9, 0.0, -0.3))
+    assert plate.corners is not None
+    np.testing.assert_allclose(plate.corners.mean(0), plate.origin, atol=1e-6)
 
 
 def test_unloaded_baseline_is_subtracted(tmp_path: Path) -> None:
@@ -139,6 +143,8 @@ def test_no_baseline_and_a_loaded_baseline_are_left_alone(tmp_path: Path, zero: 
     """ZERO without frames, or over frames in which the person stands on the plate, changes nothing."""
     plate = read(tmp_path, sensors(2), plate={"ZERO": np.array(zero)}).plates[0]
     check(plate)
+    assert not any("subtracted as the baseline" in note for note in plate.notes)
+    assert any("a load, not subtracted" in note for note in plate.notes) == (zero == [31, 35])
 
 
 @pytest.mark.parametrize(("form", "offset"), [("SIGNED", -100), ("UNSIGNED", -32700), ("UNSIGNED", 32700), ("SIGNED", 2047)])

@@ -174,8 +174,15 @@ def test_config_with_a_misspelt_key_says_did_you_mean() -> None:
 
 @pytest.mark.parametrize("study", sorted(p.parent.name for p in STUDIES.glob("*/config.yaml")))
 def test_configs_of_the_studies_are_valid(study: str) -> None:
-    """Every committed study config fits the schema."""
-    with_defaults(yaml.safe_load((STUDIES / study / "config.yaml").read_text(encoding="utf-8")), study)
+    """Every committed study config fits the schema, and what it says stands against the defaults."""
+    given = yaml.safe_load((STUDIES / study / "config.yaml").read_text(encoding="utf-8"))
+    filled = with_defaults(given, study)
+    assert set(filled) == set(config_schema()["properties"])
+    for key, value in given.items():
+        if isinstance(value, dict):
+            assert {k: filled[key][k] for k in value if value[k] is not None} == {k: v for k, v in value.items() if v is not None}
+        elif value is not None:
+            assert filled[key] == value
 
 
 @pytest.mark.parametrize(("study", "name", "column"), [("pds", "PDS13OR1grf.txt", "RGRF_Y"), ("bds", "BDS00001.txt", "Fz[N]")])
