@@ -196,10 +196,14 @@ class Named(Protocol):
     """A trial, and what the config may call it."""
 
     @property
-    def trial(self) -> str: ...  # noqa: D102
+    def trial(self) -> str:
+        """The trial, as in the tables."""
+        ...
 
     @property
-    def names(self) -> frozenset[str]: ...  # noqa: D102
+    def names(self) -> frozenset[str]:
+        """What the config may call it under `train` and `test`."""
+        ...
 
 
 T = TypeVar("T", bound=Named)
