@@ -7,19 +7,23 @@ Its moment tells the line:
 .. math:: (x - p) - h F_x/m = \bigl(h - h_e/g\bigr) F_{ex}/m + (x_e - p) F_{ez}/(m g)
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import stdtr
 
 from plumbline.evidence import Weak, split
+from plumbline.found import Candidate, Finding, Found, Interval
 from plumbline.physics import G
+from plumbline.search import BASE, design
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+CONTACT = "push"  # id of the effect
 LOUD = 5.0  # [1] times noise and usual faults, from which on something acts
 LOAD = 0.02  # [1] of body weight, the same for what the plates do not carry
 LATERAL = 0.004  # [1] of body weight, the same for a force to the side
@@ -29,6 +33,7 @@ ALWAYS = 0.9  # [1] of a trial
 SIDE = 0.9  # [1] of its square that must have one sign
 EVEN = 0.02  # [1] by which a force to the side may vary while it acts, beside noise; what carries weight can be nothing else
 EVEN_NOISE = 1.5  # [1] times the noise, the same
+LOWER = 0.9  # [1] of the error without it, which it must reach
 LONG = 0.3  # [s] that it must act at a time
 
 
@@ -206,3 +211,64 @@ def _columns(windows: Sequence[Weak], contact: Contact, rest: Sequence[Array]) -
     y = np.concatenate(list(rest)) + (p * load / G if contact.vertical else 0.0)
     columns = [pull] * contact.lateral + [load / G] * contact.vertical
     return np.column_stack(columns), y, np.concatenate(contact.loud)
+
+
+# -- what is said -----------------------------------------------------------------------------------------------------
+
+
+def named(
+    finding: Finding, windows: Sequence[Sequence[Weak]], contacts: Sequence[Contact | None], w2: Sequence[float], h: Sequence[float]
+) -> Finding | None:  # fmt: skip
+    """A finding about the windows without a contact, with the contact; errors are of all windows.  None where its moment is not there.
+
+    windows: of each subject.  w2 [1/s2], h [s2]: of each subject.
+    """
+    before, after, seen = [], [], []
+    for ws, contact, theta, k, lever in zip(windows, contacts, finding.theta, w2, h, strict=True):
+        rest = [_rest(w, "whole", theta, k, lever) for w in ws]
+        told = explained(ws, contact, rest) if contact else rest
+        before += rest
+        after += told
+        if contact:
+            moment = [_rest(w, "moment", theta, k, lever) for w in ws]
+            seen.append((*_line(ws, contact, moment, lever), _gains(ws, contact, rest, told)))
+    error = [float(np.sqrt(np.mean(np.concatenate(e) ** 2))) for e in (before, after)]
+    if not error[1] < LOWER * error[0]:
+        return None
+    gains = np.concatenate([g for _, _, g in seen])
+    t = float(gains.mean() / (gains.std(ddof=1) / np.sqrt(len(gains)) + 1e-12)) if len(gains) > 1 else 0.0
+    p = float(stdtr(max(len(gains) - 1, 1), -t))
+    parameters = _parameters(np.array([line for line, _, _ in seen]), np.array([spread for _, spread, _ in seen]))
+    push = Found(CONTACT, (CONTACT,), parameters, error[0], error[1], p, p)
+    tried = [*(c for c in finding.candidates if c.effect != CONTACT), Candidate(CONTACT, "found", error[1], p=p)]
+    others = [replace(f, before=float(np.sqrt(max(error[1] ** 2 + f.before**2 - f.after**2, 0.0))), after=error[1]) for f in finding.found]
+    return replace(finding, found=[push, *others], candidates=sorted(tried, key=lambda c: c.effect), final=error[1])
+
+
+def _rest(w: Weak, equation: str, theta: Mapping[str, Array], w2: float, h: float) -> Array:
+    """What a model leaves of an equation in every window."""
+    names = [n for n in theta if not n.startswith("=")]
+    columns, left = design(w, equation, names, w2, h)
+    return np.asarray(left - columns @ np.concatenate([theta[n] for n in (*BASE, *names)]))
+
+
+def _line(windows: Sequence[Weak], contact: Contact, rest: Sequence[Array], h: float) -> tuple[Line, Array]:
+    """Line of action and its standard errors, a jackknife over the pieces in which it acts."""
+    at = np.unique(pieces(windows, contact)[np.concatenate(contact.loud)])
+    each = [line(windows, contact, rest, h, without=int(k)) for k in at]
+    return line(windows, contact, rest, h), np.sqrt((len(each) - 1) * np.var(each, axis=0))
+
+
+def _gains(windows: Sequence[Weak], contact: Contact, rest: Sequence[Array], told: Sequence[Array]) -> Array:
+    """Log of the squared error without over that with the contact, in each piece in which it acts."""
+    at, acts = pieces(windows, contact), np.concatenate(contact.loud)
+    a, b = np.concatenate(list(rest)), np.concatenate(list(told))
+    return np.array([np.log(np.mean(a[m] ** 2) / np.mean(b[m] ** 2)) for m in ((at == k) & acts for k in np.unique(at[acts]))])
+
+
+def _parameters(lines: Array, spread: Array) -> dict[str, Interval]:
+    """Line in the middle of the subjects, with its 95 % interval: from their spread, of one or two from their own errors."""
+    error = lines.std(axis=0, ddof=1) if len(lines) > 2 else np.sqrt(np.mean(np.square(spread), axis=0))
+    half = 2 * error / np.sqrt(len(lines))
+    middle = np.median(lines, axis=0)
+    return {k: (float(v), float(v - r), float(v + r)) for k, v, r in zip(Line._fields, middle, half, strict=True) if np.isfinite(v)}

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtr, stdtrit
+from scipy.special import stdtrit
 
 from plumbline import outer
 from plumbline.candidates import CONSTANTS, candidates, false_discovery_rate
@@ -16,8 +16,9 @@ from plumbline.constants import constants
 from plumbline.contest import FALL, Case, Need, Refused, case_of, constant, need, pruned, search
 from plumbline.effects import Effect
 from plumbline.evidence import Weak
-from plumbline.found import Candidate, Finding, Found, Interval
-from plumbline.search import BASE, Fit, Sums, design, on_disk, sums
+from plumbline.found import Finding, Found, Interval
+from plumbline.outer import CONTACT
+from plumbline.search import Fit, Sums, on_disk, sums
 from plumbline.shapes import BESIDE, SHAPES
 
 Array = NDArray[np.float64]
@@ -27,10 +28,9 @@ FAULT = 0.005  # [1] of the motion that a segment table and rigid segments leave
 LEFT = 1.35  # [1] residual over noise floor and that, above which something is left
 WHOLE = 1.5  # [1] the same of the whole equation, where both halves are well explained and not together
 PLAIN = 2.0  # [1] fall of the score that an effect must bring to be named where something is left that nobody explains
-CONTACT = "push"  # found in time, see outer.py
 DROWNED = 4.0  # [1] residual over noise floor and usual faults, above which any name may be its shadow
 LEANS = 1.1  # [1] h times w2 of a person who stands with an upright trunk, to begin with
-LOWER = 0.9  # [1] of the error without it, which a constant or a contact must reach
+LOWER = 0.9  # [1] of the error without it, which a constant must reach
 SHOWS = 0.6  # [1] of what noise and usual faults leave, by which an effect of any motion must lower the rms to be named
 SAME = 0.1  # [1] share of its fall that a member may lose when another effect takes its place, and the data cannot tell them apart
 CHANCE = 0.05  # [1] false discovery rate over the catalogue, below which an effect is named
@@ -77,7 +77,7 @@ def _beside_contacts(windows: Sequence[Sequence[Weak]], effects: Mapping[str, Ef
     h = h or [LEANS / w for w in w2]
     mine = [w2[k] for k in able], [h[k] for k in able]
     finding = _judge(_Made(lambda i: still(able[i]), len(able)), effects, *mine)
-    told = _with_contact(finding, _Made(lambda i: windows[able[i]], len(able)), [contacts[k] for k in able], *mine)
+    told = outer.named(finding, _Made(lambda i: windows[able[i]], len(able)), [contacts[k] for k in able], *mine)
     return told or _judge(windows, effects, w2, h)
 
 
@@ -153,55 +153,6 @@ def _left(case: Case, members: Set) -> tuple[str, ...]:
 
 def _parts_left(case: Case, over: Mapping[str, float]) -> tuple[str, ...]:
     return tuple(e for e, w, z in zip(over, case.weight, case.as_zmp, strict=True) if w * z > 0 and over[e] > LEFT)
-
-
-# -- a contact beside the plates --------------------------------------------------------------------------------------
-
-
-def _with_contact(
-    finding: Finding, windows: Sequence[Sequence[Weak]], contacts: Sequence[outer.Contact | None], w2: Sequence[float], h: Sequence[float]
-) -> Finding | None:  # fmt: skip
-    """A finding about the windows without a contact, with the contact; errors are of all windows.  None where its moment is not there."""
-    lines, spread, gains, before, after = [], [], [], [], []
-    for ws, contact, theta, k, lever in zip(windows, contacts, finding.theta, w2, h, strict=True):
-        rest = {e: [_rest(w, e, theta, k, lever) for w in ws] for e in ("moment", "whole")}
-        before += rest["whole"]
-        if contact is None:
-            after += rest["whole"]
-            continue
-        told = outer.explained(ws, contact, rest["whole"])
-        after += told
-        lines.append(outer.line(ws, contact, rest["moment"], lever))
-        piece = np.unique(outer.pieces(ws, contact)[np.concatenate(contact.loud)])
-        each = [outer.line(ws, contact, rest["moment"], lever, without=int(k)) for k in piece]
-        spread.append(np.sqrt((len(each) - 1) * np.var(each, axis=0)))  # jackknife
-        at, acts = outer.pieces(ws, contact), np.concatenate(contact.loud)
-        a, b = np.concatenate(rest["whole"]), np.concatenate(told)
-        gains += [np.log(np.mean(a[m] ** 2) / np.mean(b[m] ** 2)) for m in ((at == k) & acts for k in piece)]
-    names = ("force", "x", "lateral", "height")
-    values = np.array(lines)
-    few = values.std(axis=0, ddof=1) if len(lines) > 2 else np.sqrt(np.mean(np.square(spread), axis=0))
-    half = 2 * few / np.sqrt(len(lines))
-    parameters = {
-        k: (float(v), float(v - r), float(v + r)) for k, v, r in zip(names, np.median(values, axis=0), half, strict=True) if v == v
-    }
-    error = [float(np.sqrt(np.mean(np.concatenate(e) ** 2))) for e in (before, after)]
-    if not error[1] < LOWER * error[0]:
-        return None
-    t = float(np.mean(gains) / (np.std(gains, ddof=1) / np.sqrt(len(gains)) + 1e-12)) if len(gains) > 1 else 0.0
-    p = float(stdtr(max(len(gains) - 1, 1), -t))
-    push = Found(CONTACT, (CONTACT,), parameters, error[0], error[1], p, p)
-    tried = [c for c in finding.candidates if c.effect != CONTACT]
-    mine = Candidate(CONTACT, "found", error[1], p=p)
-    others = [replace(f, before=float(np.sqrt(max(error[1] ** 2 + f.before**2 - f.after**2, 0.0))), after=error[1]) for f in finding.found]
-    return replace(finding, found=[push, *others], candidates=sorted([*tried, mine], key=lambda c: c.effect), final=error[1])
-
-
-def _rest(w: Weak, equation: str, theta: Mapping[str, Array], w2: float, h: float) -> Array:
-    """What a model leaves of an equation in every window."""
-    names = [n for n in theta if not n.startswith("=")]
-    columns, left = design(w, equation, names, w2, h)
-    return np.asarray(left - columns @ np.concatenate([theta[n] for n in (*BASE, *names)]))
 
 
 # -- what is said -----------------------------------------------------------------------------------------------------

@@ -14,9 +14,10 @@ from plumbline.effects import Catalogue, Channels
 from plumbline.effects._channels import of_trial, persons
 from plumbline.evidence import Weak
 from plumbline.fit import folds, free_runs
+from plumbline.outer import CONTACT
 from plumbline.physics import G
 from plumbline.plant import Plant, of_trials
-from plumbline.ranking import CONTACT, FAULT, motion
+from plumbline.ranking import FAULT, motion
 from plumbline.search import Fit, Sums, design, fit, sums
 from plumbline.study import names
 from plumbline.tables import joined
