@@ -9,7 +9,7 @@ from scipy.special import chdtrc
 
 from plumbline.effects import Effect
 from plumbline.search import CLUSTERS, Fit, Sums, fit, heldout, residual_variance, solve, subsets
-from plumbline.shapes import BESIDE, SHAPES
+from plumbline.shapes import BESIDE, PLACED, SHAPES
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -19,6 +19,7 @@ MOST = 3  # effects and shapes searched at once beside those that are always fit
 FALL = 0.06  # [1] log of the ratio of variances, summed over the equations, that an effect must bring on trials left out
 SHARE = 0.25  # [1] of what noise and a model's usual faults leave, by which it must lower the rms
 SURE = 0.05  # [1] p of no fall, beside the fall and the size that are asked for; q over the catalogue is told, and decides nothing
+REFUSED = 5  # impostors that are told
 TWINS = 0.97  # [1] correlation of what two effects add beyond the base, from which on these data cannot tell them apart
 ABSORBED = 0.995  # [1] share of an effect that the base takes
 MODEL = 0.01  # [1] of the paper's error that a model may leave before it is worth a word
@@ -115,7 +116,7 @@ class Case:
 
     def placed(self, names: Set) -> bool:
         """Whether one of them has a place of its own, which takes the constants."""
-        return any(n in SHAPES or any(p.name == "x" for p in self.effects[n].parameters) for n in names)
+        return any(n in PLACED or any(p.name == "x" for p in self.effects[n].parameters) for n in names)
 
     def constants(self, names: Set) -> Array:
         """Mean square of each equation's constant in a model, (E,)."""
@@ -232,16 +233,16 @@ def twins(all_sums: Sequence[Sums], weight: Array, names: Set) -> dict[str, set[
 
 
 def search(case: Case) -> tuple[Set, list[Refused]]:
-    """The set with the least score, counting FALL for each member, and the sets that would be better but cannot be."""
+    """The set with the least score whose members are all needed, FALL counted for each, and the sets that would be better but cannot be."""
     sets = [k for k in subsets(case.rivals, min(MOST, len(case.rivals)), case.twins) if all(BESIDE[n] in k for n in k if n in BESIDE)]
     variance = case.variance(case.errors(sets))
     score = case.score(variance) + FALL * np.array([len(names) for names in sets])
     refused: list[Refused] = []
     for k in np.argsort(score, kind="stable"):
         reason = case.impossible(sets[k])
-        if not reason:
+        if not reason and all(need(case, sets[k], n).enough for n in sets[k]):
             return sets[k], refused
-        if len(refused) < 5:
+        if reason and len(refused) < REFUSED:
             refused.append(Refused(sets[k], float(np.sqrt(variance[k, -1])), reason))
     return (), refused
 

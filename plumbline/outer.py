@@ -13,12 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtr
+from scipy.stats import ttest_1samp
 
 from plumbline.evidence import Weak, split
 from plumbline.found import Candidate, Finding, Found, Interval
 from plumbline.physics import G
-from plumbline.search import BASE, design
+from plumbline.search import BASE, CLUSTERS, design
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -33,6 +33,8 @@ ALWAYS = 0.9  # [1] of a trial
 SIDE = 0.9  # [1] of its square that must have one sign
 EVEN = 0.02  # [1] by which a force to the side may vary while it acts, beside noise; what carries weight can be nothing else
 EVEN_NOISE = 1.5  # [1] times the noise, the same
+FULL = 0.2  # [1] of its usual size, from which on a contact that the record cuts short acts for sure
+GAP = 1.5  # [1] of the distance of windows, from which on there is one between them
 LOWER = 0.9  # [1] of the error without it, which it must reach
 LONG = 0.3  # [s] that it must act at a time
 
@@ -85,6 +87,14 @@ def find(windows: Sequence[Weak], faults: float) -> Contact | None:
     return Contact(loud, pull, load, lateral is not None, vertical is not None)
 
 
+def masses(windows: Sequence[Weak]) -> dict[str, float]:
+    """Body mass in each trial [kg], as its windows tell it by the vertical force; of all trials where a contact carries some in any."""
+    each = {w.trial: w.mass * (1 - w.vertical / G) for w in windows if np.isfinite(w.vertical).all()}
+    if any(np.mean(np.abs(m / np.median(m) - 1) > LOAD / 2) > ACTS for m in each.values()):
+        return dict.fromkeys(each, float(np.median(np.concatenate(list(each.values())))))
+    return {k: float(np.median(m)) for k, m in each.items()}
+
+
 def _centred(values: Sequence[Array]) -> list[Array]:
     """Less what it is most of the time: nothing acts in more than half of the windows, though it may in one trial."""
     middle = np.median(np.concatenate(list(values)))
@@ -108,15 +118,21 @@ def _acts(windows: Sequence[Weak], residual: Sequence[Array], least: float, nois
     if max(square[every[loud] > 0].sum(), square[every[loud] < 0].sum()) < SIDE * square.sum():
         return None
     size = float(np.sqrt(square.mean()))
-    return None if _uneven(windows, residual, masks) > max(EVEN, EVEN_NOISE * noise / size) else masks
+    if _uneven(windows, residual, masks) > max(EVEN, EVEN_NOISE * noise / size):
+        return None
+    side = np.sign(every[loud].sum())  # seen elsewhere, it may also be seen where the record ends or begins
+    cut = [_runs(r * side > least, w.time, full=r * side > FULL * size) for r, w in zip(residual, windows, strict=True)]
+    return [m | c for m, c in zip(masks, cut, strict=True)]
 
 
-def _runs(loud: Mask, time: Array) -> Mask:
-    """Without runs shorter than LONG."""
+def _runs(loud: Mask, time: Array, *, full: Mask | None = None) -> Mask:
+    """Without runs shorter than LONG, but for those that reach `full` and that a beginning, an end or a gap may have made short."""
     out = loud.copy()
+    gap = np.concatenate([[True], np.diff(time) > GAP * np.median(np.diff(time)), [True]]) if len(time) > 1 else np.ones(2, bool)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], loud.view(np.int8), [0]])))
     for a, b in zip(edges[::2], edges[1::2], strict=True):
-        if time[b - 1] - time[a] < LONG:
+        cut = full is not None and full[a:b].any() and (gap[a] or gap[b])
+        if time[b - 1] - time[a] < LONG and not cut:
             out[a:b] = False
     return out
 
@@ -236,8 +252,8 @@ def named(
     if not error[1] < LOWER * error[0]:
         return None
     gains = np.concatenate([g for _, _, g in seen])
-    t = float(gains.mean() / (gains.std(ddof=1) / np.sqrt(len(gains)) + 1e-12)) if len(gains) > 1 else 0.0
-    p = float(stdtr(max(len(gains) - 1, 1), -t))
+    # fewer can tell no chance; that it is there was seen in time, far above the noise
+    p = float(ttest_1samp(gains, 0.0, alternative="greater").pvalue) if len(gains) >= CLUSTERS else float("nan")
     parameters = _parameters(np.array([line for line, _, _ in seen]), np.array([spread for _, spread, _ in seen]))
     push = Found(CONTACT, (CONTACT,), parameters, error[0], error[1], p, p)
     tried = [*(c for c in finding.candidates if c.effect != CONTACT), Candidate(CONTACT, "found", error[1], p=p)]

@@ -48,10 +48,10 @@ def judge(windows: Sequence[Sequence[Weak]], effects: Mapping[str, Effect], w2: 
 
 def _beyond_chance(finding: Finding) -> Finding:
     """A finding with the false discovery rate over all that was tested; what may be chance by it is not named."""
-    constants = {(f.effect or ", ".join(f.family)): f.p for f in finding.found}
-    q = false_discovery_rate({c.effect: c.p for c in finding.candidates if np.isfinite(c.p)} | constants)
+    p = {c.effect: c.p for c in finding.candidates} | {(f.effect or ", ".join(f.family)): f.p for f in finding.found}
+    q = false_discovery_rate({k: v for k, v in p.items() if np.isfinite(v)})
     tried = [replace(c, q=q.get(c.effect, float("nan"))) for c in finding.candidates]
-    found = [replace(f, q=q[f.effect or ", ".join(f.family)]) for f in finding.found]
+    found = [replace(f, q=q.get(f.effect or ", ".join(f.family), float("nan"))) for f in finding.found]
     chance = {f.effect for f in found if f.q > CHANCE}
     dropped = [f for f in found if f.effect in chance]
     final = float(np.sqrt(finding.final**2 + sum(max(f.before**2 - f.after**2, 0.0) for f in dropped)))
@@ -118,10 +118,13 @@ def _judge(windows: Sequence[Sequence[Weak]], effects: Mapping[str, Effect], w2:
 
 
 def _plain(case: Case, members: Set) -> Set:
-    """Members without shapes where nothing is left without them, and without what any motion has where it hardly shows."""
+    """Members without shapes where nothing is left without them, or with an effect that looks the same; and without what any motion has
+    where it hardly shows.
+    """
     few = tuple(n for n in members if n not in SHAPES or n in BESIDE)
-    if few != members and not _left(case, few):
-        members = few
+    causes = ((*few, k) for n in members if n in SHAPES for k in sorted(case.twins[n] - {*SHAPES, *case.settled, *few}))
+    likely = (s for s in causes if not case.impossible(s) and need(case, s, s[-1]).enough)
+    members = next((s for s in (few, *likely) if s != members and not _left(case, s)), members)
     faint = {n for n in members if n in ALWAYS and need(case, members, n).share < SHOWS}
     return tuple(n for n in members if n not in faint)
 

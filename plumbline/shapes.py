@@ -99,3 +99,5 @@ SHAPES["~pose"] = _shape(
 )
 BESIDE = {"~pose": "ang_mom"}
 """Faults of the same measurement as an effect: they may stand beside it, and only there, without anything being unexplained."""
+PLACED = ("~cubic", "~wall_right", "~wall_left", "~cop_edge")
+"""Shapes that begin or grow from a place: it stands in the constants too."""

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from made_study import EVALUATION, Result
 
-from plumbline import evidence, rungs
+from plumbline import evidence, outer, rungs
 from plumbline.candidates import false_discovery_rate
 from plumbline.constants import _Level, _moment
 from plumbline.criticism import of_cohort, of_part, settled
@@ -210,3 +210,29 @@ def test_two_subjects_are_judged_together_and_alone(tmp_path: Path) -> None:
     said = candidates[(candidates["axis"] == "lateral") & (candidates["status"] == "found")]
     assert said.groupby("subject")["effect"].agg(list).to_dict() == {s: ["ang_mom"] for s in ("all", "sub-01", "sub-02")}
     assert isinstance(judged, pd.DataFrame)
+
+
+def test_a_load_that_somebody_carries_does_not_pass_for_body_mass(tmp_path: Path) -> None:
+    """50 N carried for a third of each trial lowers what the plates say of the mass; the windows know it to 3 parts in a thousand."""
+    got = made(tmp_path, {"push": {"lateral": 0.0, "force": 50.0, "x": -0.4, "duration": 3.0}})
+    (subject,) = [draw_subject("sub-01", 21)]
+    windows, _ = settled(got.signals, got.pushes, got.coverage, EFFECTS, EVALUATION, "lateral")
+    plates = got.coverage["mass"].median()
+    assert plates < 0.99 * subject.mass
+    assert {round(w.mass, 6) for w in windows} == {round(windows[0].mass, 6)}
+    assert windows[0].mass == pytest.approx(subject.mass, rel=3e-3)
+    assert outer.masses(windows)[windows[0].trial] == pytest.approx(windows[0].mass, rel=1e-3)
+
+
+def test_a_contact_cut_short_by_the_end_of_the_record_counts_where_it_is_seen_elsewhere() -> None:
+    """A run too short to be told alone is dropped inside a record, and kept beside a gap or an end if it acts in full there."""
+    time = np.concatenate([np.arange(0, 2, 0.05), np.arange(4, 6, 0.05)])
+    loud = np.zeros(len(time), bool)
+    loud[10:14] = loud[36:40] = loud[-3:] = True
+    assert not outer._runs(loud, time).any()
+    full = loud & (time < 5)
+    kept = outer._runs(loud, time, full=full)
+    assert not kept[10:14].any()
+    assert kept[36:40].all()
+    assert not kept[-3:].any()
+    assert outer._runs(loud, time, full=loud)[-3:].all()
