@@ -94,13 +94,3 @@ def _untried(effect: Effect) -> str:
     if effect.twin:
         return f"no motion tells it from {effect.twin}"
     return "no contact is seen that the plates miss"
-
-
-def false_discovery_rate(p: Mapping[str, float]) -> dict[str, float]:
-    """q of each p: Benjamini and Hochberg 1995."""
-    order = sorted(p, key=lambda k: -p[k])
-    out, least = {}, 1.0
-    for rank, name in zip(range(len(order), 0, -1), order, strict=True):
-        least = min(least, p[name] * len(order) / rank)
-        out[name] = least
-    return out

@@ -15,6 +15,7 @@ from scipy.special import chdtrc
 
 from plumbline.control_shapes import SHAPES
 from plumbline.effects import Effect, catalogue
+from plumbline.false_discovery import false_discovery_rate
 
 Array = NDArray[np.float64]
 
@@ -196,7 +197,7 @@ def _step(sums: _Sums, found: str, known: Mapping[str, Effect], twins: Mapping[s
         more = set(name.split("+")) - have if name else set()
         if len(more) == 1 and have < set(name.split("+")) and (sums.mode == "loop" or _framewise(known[min(more)])):
             gains[more.pop()] = float((now - sums.score(name)).sum() / 2)
-    q = _q_values({n: _p_value(g, sums.sizes(_joined(found, n)) - sums.sizes(found)) for n, g in gains.items()})
+    q = false_discovery_rate({n: _p_value(g, sums.sizes(_joined(found, n)) - sums.sizes(found)) for n, g in gains.items()})
     least = {n: max(COUNTS, twins.get(n, 0.0), MATTERS * now.sum() / 2, SHAPED if n in SHAPES else 0.0) for n in gains}
     good = {n: g for n, g in gains.items() if g > least[n] and q[n] < LEVEL and _matters(sums, found, _joined(found, n))}
     if not good:
@@ -225,13 +226,3 @@ def _matters(sums: _Sums, found: str, after: str) -> bool:
 
 def _p_value(gain: float, sizes: int) -> float:
     return float(chdtrc(max(sizes, 1), max(2 * gain / SPREAD, 0.0)))
-
-
-def _q_values(p: Mapping[str, float]) -> dict[str, float]:
-    """Benjamini and Hochberg 1995."""
-    order = sorted(p, key=lambda n: p[n])
-    out, least = {}, 1.0
-    for rank, name in reversed(list(enumerate(order, start=1))):
-        least = min(least, p[name] * len(order) / rank)
-        out[name] = least
-    return out

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from plumbline import outer
-from plumbline.candidates import CONSTANTS, candidates, false_discovery_rate
+from plumbline.candidates import CONSTANTS, candidates
 from plumbline.constants import constants
 from plumbline.contest import FALL, Case, Need, Refused, case_of, constant, need, pruned, search
 from plumbline.effects import Effect
 from plumbline.evidence import Weak
+from plumbline.false_discovery import false_discovery_rate
 from plumbline.found import Finding, Found, Interval
 from plumbline.outer import CONTACT
 from plumbline.search import Fit, Sums, on_disk, sums

@@ -9,10 +9,10 @@ import pytest
 from made_study import EVALUATION, Result
 
 from plumbline import evidence, outer, rungs
-from plumbline.candidates import false_discovery_rate
 from plumbline.constants import _Level, _moment
 from plumbline.criticism import of_cohort, of_part, settled
 from plumbline.effects import catalogue
+from plumbline.false_discovery import false_discovery_rate
 from plumbline.found import Finding
 from plumbline.ladder import Said, ladder, verdict
 from plumbline.simulate.person import draw_subject
