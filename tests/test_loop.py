@@ -1,6 +1,7 @@
 """The closed loop beside the measured motion, and the terms that effects put into it."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from made_loci import PUBLISHED, RATE, made
 
 from plumbline import batch, law
 from plumbline.effects import catalogue
+from plumbline.effects.lag import follow
 from plumbline.estimators import output_error
 from plumbline.models.loop import Scene, Term, simulate
 
@@ -58,6 +60,18 @@ def test_a_delay_is_that_of_the_law_without_terms() -> None:
     rms = np.sqrt(np.mean((got - old) ** 2, axis=(1, 2, 3)))
     assert rms[0] < 1e-4
     assert rms[1] < 6e-4
+
+
+@pytest.mark.parametrize("step", [0.02, 0.005])
+def test_a_lag_is_the_same_at_any_rate(step: float) -> None:
+    """A command that rises straight from rest is followed as the differential equation says, t - T (1 - exp(-t/T)), T = 80 ms."""
+    t = step * np.arange(1, 60)
+    now, got = SimpleNamespace(step=step, kept=np.zeros(()), before=np.zeros(())), []
+    for command in t:
+        now.kept = follow(command, now, [np.array(0.08)])  # type: ignore[arg-type]
+        now.before = command
+        got.append(float(now.kept))
+    np.testing.assert_allclose(got, t - 0.08 * (1 - np.exp(-t / 0.08)), atol=1e-12)
 
 
 def test_the_true_law_follows_a_motion_without_noise() -> None:

@@ -7,8 +7,11 @@ from plumbline.models.loop import Array, Now, Sizes, Term
 
 
 def follow(p: Array, now: Now, sizes: Sizes) -> Array:
-    """ZMP one frame on its way to the command p [m]."""
-    return np.asarray(now.kept + (1 - np.exp(-now.step / np.maximum(sizes[0], 1e-6))) * (p - now.kept))
+    """ZMP one frame on its way to the command p [m], exact for a command that is straight between frames."""
+    time = np.maximum(sizes[0], 1e-12) / now.step
+    left = np.exp(-1 / time)
+    mean = time * (1 - left)  # weight of the command over the frame, its end excluded
+    return np.asarray(left * now.kept + (mean - left) * now.before + (1 - mean) * p)
 
 
 STARTS = ((0.03,), (0.08,), (0.14,))

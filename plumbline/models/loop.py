@@ -66,6 +66,7 @@ class Now:
     (m,).  step: [s].  limits: left, right [m].  area: integral of the measured x from the record's start to the locus' [m s], (m,);
     swept: of x since then.
     kept: what this term returned one frame before (at the start: the measured ZMP for asked and out, else 0).
+    before: what a term of asked and out was given one frame before (at the start: the measured ZMP).
     """
 
     def __init__(self, scene: "Scene", k: int) -> None:
@@ -77,7 +78,7 @@ class Now:
             past[: self.lead + 1] = measured[: self.lead + 1, None]
         self.row, self._swept = self.lead, (self.lead, np.zeros(self.past_x.shape[1:]))
         self.x, self.v = self.past_x[self.lead], self.past_v[self.lead]
-        self.seen, self.far, self.kept = (self.x, self.v), self.x, self.x
+        self.seen, self.far, self.kept, self.before = (self.x, self.v), self.x, self.x, self.x
         self.which = np.arange(k)[:, None], np.arange(batch.x.shape[1])[None]
 
     def at(self, row: int, x: Array, v: Array) -> None:
@@ -182,6 +183,7 @@ class _Law:
         shape = (k, scene.batch.x.shape[1])
         start = np.broadcast_to(scene.batch.p[scene.batch.lead], shape)
         self.kept = [start if t.stage in ("asked", "out") else np.zeros(shape) for t in self.terms]
+        self.before = list(self.kept)
         self.fresh = True
 
     def warm(self, now: Now) -> None:
@@ -224,8 +226,10 @@ class _Law:
         return np.asarray(dp)
 
     def _call(self, i: int, now: Now, *given: Array) -> Any:
-        now.kept = self.kept[i]
+        now.kept, now.before = self.kept[i], self.before[i]
         out = self.terms[i].function(*given, now, self.sizes[i])
+        if self.terms[i].stage in ("asked", "out"):
+            self.before[i] = given[0]
         if self.terms[i].stage != "seen":
             self.kept[i] = out
         return out
