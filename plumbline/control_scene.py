@@ -19,11 +19,13 @@ from plumbline.plant import rows_of, sampling_rate
 from plumbline.weak import Bump
 
 Array = NDArray[np.float64]
+Regime = NDArray[np.int8]
 Sizes = Mapping[str, Sequence[float]]
 """Effect -> its parameters where it can undo itself, else the coefficients of its columns."""
 
 FEWEST_LOCI, FEWEST_TRIALS = 4, 2
 LEAST_INSIDE = 0.2  # share of frames between the limits below which the regimes are not believed
+PASSED = 0.01  # [m] by which the ZMP must go beyond a limit for it to be none
 LATE = 0.1  # [s]
 HALF_WIDTH, EXPONENT = 0.3, 4  # of the bumps that omega is fitted with again [s]
 REFITS = 2  # what an effect takes off the ZMP depends on omega
@@ -194,6 +196,7 @@ def _with_base(group: Group, frames: pd.DataFrame, trust: pd.DataFrame | None, r
         regime, ends = np.zeros_like(regime), ends._replace(left=-np.inf, right=np.inf)
     # a limit at which no regime was found may have been touched: the ZMP was never seen beyond
     limits = tuple(e if np.isfinite(e) else r for e, r in zip((ends.left, ends.right), reached, strict=True))
+    limits, regime = _unpassed(group.batch.p, regime, limits, reached)
     batch, thin = laws.thinned(group.batch.take(steady), regime[:, steady])
     batch = replace(batch, p=_impulse(group.batch.take(steady), batch))
     start = saturation.fit(group.batch.take(steady))
@@ -204,6 +207,17 @@ def _with_base(group: Group, frames: pd.DataFrame, trust: pd.DataFrame | None, r
     begun, area = _begun(group, frames)
     scene = Scene(batch, thin, omega, (limits[0], limits[1]), begun[steady], area[steady])
     return Stage(scene, base, _late(scene, base), tuple(group.loci["trial"][steady].astype(str)))
+
+
+def _unpassed(p: Array, regime: Regime, limits: Sequence[float], reached: Sequence[float]) -> tuple[tuple[float, ...], Regime]:
+    """Limits and regimes, a limit that the ZMP passed put where it was reached: what lies short of it was a turn, taken for a limit."""
+    out, regime = [], regime.copy()
+    for side, limit, end in zip((-1, 1), limits, reached, strict=True):
+        passed = side * (end - limit) > PASSED
+        out.append(end if passed else limit)
+        if passed:
+            regime[(regime == side) & (side * (end - p) > PASSED)] = 0
+    return tuple(out), regime
 
 
 def _impulse(fine: Batch, coarse: Batch) -> Array:
