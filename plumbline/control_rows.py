@@ -1,14 +1,14 @@
 """Rows of the table `control`."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from plumbline.control_scene import Stage
-from plumbline.effects import Effect
+from plumbline.effects import Effect, Parameter
 from plumbline.estimators.clustered import jackknife, reach
 from plumbline.estimators.loop_error import Fit
 from plumbline.tables import TABLES
@@ -24,7 +24,7 @@ def of_fit(got: Fit, sums: tuple[Array, ...], stage: Stage, known: Mapping[str, 
     frames = stage.scene.batch.inside.sum(0)
     found = _parameters(got, known)
     least = {"s": DOUBT * stage.shift}  # a filter is not quite the delay that was taken out
-    refused = any(all(abs(found[n][p.name]["value"]) < max(p.matters, least.get(p.unit, 0.0)) for p in known[n].parameters) for n in found)
+    refused = any(_faint(found[n], known[n].parameters, least) for n in found)
     refused |= any(found[n][p.name]["value"] in (p.lower, p.upper) for n in found for p in known[n].parameters if p.matters)
     about = {"candidate": "+".join(got.candidate.effects), "parameters": json.dumps(found), "refused": refused, "settled": got.settled}
     about |= {"mode": "loop" if got.candidate.closed else "frame"}
@@ -34,6 +34,12 @@ def of_fit(got: Fit, sums: tuple[Array, ...], stage: Stage, known: Mapping[str, 
         mine = trials == trial
         row = {"trial": str(trial), "loci": int(mine.sum()), "frames": int(frames[mine].sum())}
         yield blank() | about | row | {name: float(one[mine].sum()) for name, one in zip(names, sums, strict=True)}
+
+
+def _faint(found: Mapping[str, Any], parameters: Sequence[Parameter], least: Mapping[str, float]) -> bool:
+    """Whether every parameter that has a least size is below it; least: by unit, beside the parameters' own."""
+    sizes = {p.name: size for p in parameters if (size := max(p.matters, least.get(p.unit, 0.0))) > 0}
+    return bool(sizes) and all(abs(found[name]["value"]) < size for name, size in sizes.items())
 
 
 def _parameters(got: Fit, known: Mapping[str, Effect]) -> dict[str, dict[str, Any]]:

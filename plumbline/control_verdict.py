@@ -19,7 +19,7 @@ from plumbline.false_discovery import false_discovery_rate
 
 Array = NDArray[np.float64]
 
-COUNTS = 8.0  # log likelihood on trials left out that an effect must gain
+COUNTS = 8.0  # log likelihood on trials left out that an effect must gain, also without the trial in which it gains most
 MATTERS = 0.015  # share that it must take off the score, and off the geometric mean of the errors of CoM and ZMP
 SHAPED = 25.0  # log likelihood that a shape without a cause must gain
 FALLS = 0.05  # share that it must take off the error of the simulated CoM
@@ -193,13 +193,17 @@ def _step(sums: _Sums, found: str, known: Mapping[str, Effect], twins: Mapping[s
     """What to add to the effects found; None where nothing counts."""
     now, have = sums.score(found), set(filter(None, found.split("+")))
     gains: dict[str, float] = {}
+    sure: dict[str, float] = {}  # gained without the best trial: one trial of odd noise outvotes the others
     for name in sums.names:
         more = set(name.split("+")) - have if name else set()
         if len(more) == 1 and have < set(name.split("+")) and (sums.mode == "loop" or _framewise(known[min(more)])):
-            gains[more.pop()] = float((now - sums.score(name)).sum() / 2)
+            new = more.pop()
+            each = (now - sums.score(name)) / 2
+            gains[new], sure[new] = float(each.sum()), float(each.sum() - each.max())
     q = false_discovery_rate({n: _p_value(g, sums.sizes(_joined(found, n)) - sums.sizes(found)) for n, g in gains.items()})
     least = {n: max(COUNTS, twins.get(n, 0.0), MATTERS * now.sum() / 2, SHAPED if n in SHAPES else 0.0) for n in gains}
-    good = {n: g for n, g in gains.items() if g > least[n] and q[n] < LEVEL and _matters(sums, found, _joined(found, n))}
+    able = [n for n, g in gains.items() if g > least[n] and sure[n] > COUNTS and q[n] < LEVEL]
+    good = {n: gains[n] for n in able if _matters(sums, found, _joined(found, n))}
     if not good:
         return None
     most = max(good.values())

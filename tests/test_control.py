@@ -83,6 +83,17 @@ def test_a_delay_of_a_published_law() -> None:
     assert judge(table, settled=False)["missing"] is None
 
 
+def test_what_one_trial_alone_asks_for_is_not_named() -> None:
+    """A delay whose gain comes from one trial: nothing named, though the sum over trials is as large."""
+    table = ledger(pendulum(5, delay=0.1)).set_index("trial")
+    odd, plain = table.index[0], table["candidate"] == ""
+    late = ~plain & (table["mode"] == "loop")
+    rest = table.index != odd
+    assert judge(table.reset_index())["missing"]
+    table.loc[late & rest, "score"] = table[plain & (table["mode"] == "loop")]["score"].reindex(table.index)[late & rest]
+    assert judge(table.reset_index())["missing"] == []
+
+
 LAW = Law(k1=3.0, k2=0.8, noise=2.5e-3)
 
 
@@ -92,12 +103,14 @@ LAW = Law(k1=3.0, k2=0.8, noise=2.5e-3)
         ("lag", "time", 0.1, 0.015, {"lag": 0.1}),
         ("intermittent", "half_width", 0.015, 0.003, {"quirks": Quirks(dead=0.015)}),
         ("ref_drift", "rate", 0.002, 0.0002, {"quirks": Quirks(drift=0.002)}),
+        ("integral", "ki", 0.4, 0.1, {"quirks": Quirks(integral=0.4)}),
+        ("limits", "knee", 0.03, 0.008, {"quirks": Quirks(knee=0.03)}),
     ],
 )
 def test_what_a_law_hides_is_found(
     tmp_path: Path, effect: str, parameter: str, size: float, within: float, options: dict[str, Any]
 ) -> None:
-    """Lag, dead zone and drift of the reference: in the family of the one entry, its own size in the table within the tolerance."""
+    """Lag, dead zone, drift of the reference, integral, soft limits: in the family of the one entry, its size within the tolerance."""
     table = ledger(person(tmp_path, 21, LAW, **options))
     block = judge(table)
     assert [effect in m["family"] for m in block["missing"]] == [True]
