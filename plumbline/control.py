@@ -219,7 +219,8 @@ def _ledger(stage: Stage, known: Mapping[str, Effect], model: tuple[str, ...]) -
         search = _Search(stage, known, _criterion(alone, scene, EARLY) or made, alone.theta[:3], _settled(alone))
         fits = [fits[0], *[f for f in [search.best(())] if f is not None]]
     else:
-        pairs = [{n, b} for n in partners for b in gains if b != n and (n == partners[0] or b not in shapes)]
+        others = [*gains, *(n for n in known if n not in framewise and n not in gains)]  # the latter leave no trace alone
+        pairs = [{n, b} for n in partners for b in others if b != n and (n == partners[0] or b not in shapes)]
         fits += _several(search, fits, pairs, model)
     for f in fits:
         yield from search.rows(f)
