@@ -17,6 +17,7 @@ SIZE = {
     "ang_mom": ("beta", -1.0), "height": ("beta", 1.0), "sync": ("delay", "delay"), "offset": ("b", "b"), "drift": ("c", "c"),
     "gain": ("q", "q"), "com_bias": ("scale", "scale"), "hand": ("k", "k"), "delay": ("delay", "delay"), "lag": ("time", "time"),
     "intermittent": ("half_width", "half_width"), "ref_drift": ("rate", "rate"), "push": ("force", "force"),
+    "force_scale": ("s", "s"), "integral": ("ki", "ki"), "limits": ("knee", "knee"),
 }  # fmt: skip
 
 

@@ -84,12 +84,13 @@ def _alone(case: Any, truth: Mapping[str, Any]) -> dict[str, list[float]]:
     from dataclasses import replace
 
     from benchmarks._study import Stages
+    from plumbline.simulate import cohort
 
     if len(truth["plant"]) < 2:
         return {}
     return {
-        name: list(Stages(replace(case, effects={name: case.effects[name]})).base_error())
-        for name in truth["plant"]
+        called: list(Stages(replace(case, effects={name: sizes})).base_error())
+        for name, sizes in case.effects.items() if (called := cohort.CALLED.get(name, name)) in truth["plant"]
     }  # fmt: skip
 
 

@@ -94,7 +94,13 @@ INSIDE: dict[str, Draw] = {
     "lag": _lag,
     "intermittent": _zone,
     "ref_drift": _spread("rate", 0.0003, 0.004, signed=True),
+    "shear_scale": _spread("s", 0.005, 0.15, signed=True),
+    "integral": _spread("ki", 0.02, 0.6),
+    "limits": _spread("knee", 0.004, 0.04),
 }
+
+#: hidden effects that the catalogue of effects calls otherwise
+CALLED = {"shear_scale": "force_scale"}
 
 #: effects that stand in no catalogue
 BEYOND: dict[str, Draw] = {
@@ -116,6 +122,8 @@ BEYOND: dict[str, Draw] = {
 CLASHES = (
     {"offset", "tilt", "com_bias"}, {"sync", "filter", "soft_tissue"}, {"gain", "com_bias", "hand"}, {"delay", "lag"},
     {"delay", "intermittent"}, {"lag", "intermittent"}, {"push", "hand"}, {"soft_tissue", "com_bias"}, {"push", "soft_tissue"},
+    {"shear_scale", "gain"}, {"shear_scale", "com_bias"}, {"shear_scale", "hand"}, {"shear_scale", "soft_tissue"},
+    {"integral", "ref_drift"}, {"integral", "intermittent"}, {"limits", "lag"}, {"limits", "delay"}, {"limits", "intermittent"},
 )  # fmt: skip
 
 
@@ -141,13 +149,14 @@ class Case:
     force_noise: float
 
     def truth(self) -> dict[str, Any]:
-        """What is hidden: effects with sizes, those of each ledger, whether all stand in the catalogue; and what was drawn."""
+        """What is hidden, by the catalogue's names: effects with sizes, those of each ledger, whether all stand there; and draws."""
         control = sorted(set(self.effects) & CONTROL)
+        plant = sorted(set(self.effects) - CONTROL)
         return {
             "seed": self.seed,
             "kind": self.kind,
-            "effects": self.effects,
-            "plant": sorted(set(self.effects) - CONTROL),
+            "effects": {CALLED.get(k, k): sizes for k, sizes in self.effects.items()},
+            "plant": [CALLED.get(k, k) for k in plant],
             "control": control,
             "inside": not set(self.effects) & OUTSIDE,
             "subjects": [{"mass": s.mass, "height": s.height, "sex": s.sex, "bias": bias(s)} for s in self.subjects],
