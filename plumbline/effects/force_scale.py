@@ -12,8 +12,13 @@ def columns(c: Channels) -> Array:
 
 
 def force(c: Channels) -> Array:
-    """-F/m [per 1]."""
+    """-F/m [per s/(1 + s)], F as recorded."""
     return np.asarray((-c.grf_x / c.mass)[:, None])
+
+
+def values(theta: Array, constant: float) -> Array:
+    """s from its share of the recorded force."""
+    return np.asarray(theta / (1.0 - theta))
 
 
 EFFECT = Effect(
@@ -27,5 +32,6 @@ EFFECT = Effect(
     separated="a static trial on a balance; the vertical equation",
     columns=columns,
     force=force,
+    values=values,
     recorded=True,
 )

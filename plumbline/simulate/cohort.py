@@ -116,6 +116,7 @@ BEYOND: dict[str, Draw] = {
     "rhythm": _spread("size", 0.003, 0.025, frequency=(0.25, 0.7)),
     "lopsided": _spread("share", 0.1, 0.9),
     "softening": _spread("bend", 0.3, 0.08),
+    "hand_damper": _spread("c", 5.0, 150.0, height=(0.9, 1.3)),
 }
 
 #: pairs that no study can tell apart are not drawn together

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from plumbline.simulate.contacts import Field, Leaning, Spring
+from plumbline.simulate.contacts import Leaning, Spring
 from plumbline.simulate.hidden._setup import Setup
 from plumbline.simulate.posture import Wave
 
@@ -27,11 +27,6 @@ def height(setup: Setup, *, amplitude: float = 0.017, frequency: float = 1.0, cu
 def hand(setup: Setup, *, k: float = 150.0, x: float = 0.0, height: float = 1.1) -> None:
     """An unmeasured hold on something fixed: spring k [N/m] to the place x [m] at a height [m]."""
     setup.contacts.append(Spring(k, x, height))
-
-
-def hand_damper(setup: Setup, *, c: float = 60.0, height: float = 1.1) -> None:
-    """An unmeasured hold that only damps: force -c x' [N s/m] at a height [m]."""
-    setup.contacts.append(Field(lambda time, x, v: -c * v, height))
 
 
 def push(setup: Setup, *, lateral: float = 20.0, force: float = 0.0, x: float = 0.3, duration: float = 4.0, height: float = 1.2) -> None:

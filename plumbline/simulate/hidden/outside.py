@@ -25,6 +25,11 @@ def cubic(setup: Setup, *, k: float = 60000.0, height: float = 1.1) -> None:
     setup.contacts.append(Field(lambda time, com, v: -k * com**3, height))
 
 
+def hand_damper(setup: Setup, *, c: float = 60.0, height: float = 1.1) -> None:
+    """An unmeasured hold that only damps: force -c x' [N s/m] at a height [m]."""
+    setup.contacts.append(Field(lambda time, com, v: -c * v, height))
+
+
 def periodic(setup: Setup, *, size: float = 10.0, frequency: float = 0.7, height: float = 1.1) -> None:
     """A lateral force of unknown source, size [N], frequency [Hz], its phase another in each trial."""
     phase, w = setup.phases(), 2 * np.pi * frequency
