@@ -28,6 +28,7 @@ Set = tuple[str, ...]
 FAULT = 0.005  # [1] of the motion that a segment table and rigid segments leave in any study
 LEFT = 1.35  # [1] residual over noise floor and that, above which something is left
 WHOLE = 1.5  # [1] the same of the whole equation, where both halves are well explained and not together
+MANY = 2  # causes of one study, above which they are doubted
 PLAIN = 2.0  # [1] fall of the score that an effect must bring to be named where something is left that nobody explains
 DROWNED = 4.0  # [1] residual over noise floor and usual faults, above which any name may be its shadow
 LEANS = 1.1  # [1] h times w2 of a person who stands with an upright trunk, to begin with
@@ -147,10 +148,10 @@ def _over(case: Case, members: Set) -> dict[str, float]:
     return dict(zip(case.equations, (np.sqrt(variance) / case.usual).tolist(), strict=True))
 
 
-def _left(case: Case, members: Set) -> tuple[str, ...]:
-    """Equations in which more is left than noise and a model's usual faults explain."""
+def _left(case: Case, members: Set, limit: float = WHOLE) -> tuple[str, ...]:
+    """Equations in which more is left than noise and a model's usual faults explain.  limit: of the whole one."""
     over = _over(case, members)
-    if over["whole"] > WHOLE:  # parameters that suit each half alone and not both
+    if over["whole"] > limit:  # parameters that suit each half alone and not both
         return tuple(dict.fromkeys((*_parts_left(case, over), "whole")))
     return _parts_left(case, over)
 
@@ -168,7 +169,8 @@ def _finding(
 ) -> Finding:  # fmt: skip
     needs = {n: need(case, members, n) for n in (*members, *case.settled) if n in members or not case.twins[n] & set(members)}
     named = [n for n in (*members, *case.settled) if n in needs and n not in SHAPES and _matters(case, members, n, needs[n])]
-    over, left = _over(case, members), _left(case, members)
+    # many causes at once can put on the look of one that no list has: they must hold together all the better
+    over, left = _over(case, members), _left(case, members, LEFT if len(named) > MANY else WHOLE)
     shapes = tuple(n for n in members if n in SHAPES and n not in BESIDE)
     if left or shapes:  # what nobody explains may look like any effect a little
         most = max(o * u for o, u, w in zip(over.values(), case.usual * case.as_zmp, case.weight, strict=True) if w > 0)
