@@ -15,6 +15,7 @@ from scipy.special import chdtrc
 
 from plumbline.control_shapes import SHAPES
 from plumbline.effects import Effect, catalogue
+from plumbline.effects_text import separated
 from plumbline.false_discovery import false_discovery_rate
 
 Array = NDArray[np.float64]
@@ -50,12 +51,14 @@ def judge(
         "base_error_mm": sums.error(""), "model_error_mm": sums.error(wanted), "final_error_mm": sums.error(found),
         "noise_floor_mm": sums.error(best, "fitted_square_sum"), "missing": missing, "unexplained": left is not None,
         "description": _described(left, sums, found, known) if left else "", "reason": _reason(missing, sums, found),
+        "cannot_judge": {k: ", ".join(e.needs) for k, e in known.items() if e.ledger == "control" and not e.law},
+        "separate": [separated(m["family"], known) for m in missing if len(m["family"]) > 1],
     }  # fmt: skip
     return block if settled or not (missing or left) else block | UNSETTLED
 
 
-UNSETTLED = {
-    "missing": None, "unexplained": None, "description": "",
+UNSETTLED: dict[str, Any] = {
+    "missing": None, "unexplained": None, "description": "", "separate": [],
     "reason": "not judged: the plant equation lacks something that no effect explains, and it would pass for a fault of the law",
 }  # fmt: skip
 

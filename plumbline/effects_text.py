@@ -1,6 +1,6 @@
 """The catalogue of effects in words: for the command line and for docs/effects.md."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -101,3 +101,9 @@ def _notes(effect: Effect) -> Iterator[str]:
         yield f"no recording of motion alone can tell it from {_alike(effect)[0]}: never searched for, only named beside it"
     if effect.settled:
         yield "always fitted and taken out before anything else is judged"
+
+
+def separated(family: Sequence[str], effects: Mapping[str, Effect]) -> str:
+    """Recordings that would tell the members of a family apart, as the catalogue has them."""
+    ways = dict.fromkeys(effects[k].separated for k in family if k in effects and effects[k].separated)
+    return f"{' or '.join(family)}: {'; '.join(ways)}"

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from plumbline.effects import Effect
+from plumbline.effects_text import separated
 from plumbline.found import Candidate, Finding, Found
 from plumbline.shapes import SHAPES
 
@@ -120,10 +121,9 @@ def _separate(missing: Sequence[Row], rows: pd.DataFrame, effects: Mapping[str, 
     """What would tell the members of each family apart: another recording, or more trials like these."""
     about = rows.set_index("effect")
     for family in dict.fromkeys(tuple(entry["family"]) for entry in missing if len(entry["family"]) > 1):
-        ways = dict.fromkeys(effects[k].separated for k in family if k in effects and effects[k].separated)
         alike = about.loc[[k for k in family[1:] if k in about.index]].dropna(subset=["vif"])
         more = "".join(_more_trials(str(k), row) for k, row in alike.iterrows())
-        yield f"{' or '.join(family)}: {'; '.join(ways)}{more}"
+        yield separated(family, effects) + more
 
 
 def _more_trials(effect: str, row: pd.Series) -> str:

@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 from plumbline.effects import catalogue
+from plumbline.effects_text import separated
 from plumbline.report import linked, methods, verdicts, views
 from plumbline.report.missing import Ledger, ledger, rate, scaled
 
@@ -63,11 +64,11 @@ def test_families_are_named_together() -> None:
 
 
 def test_what_to_record_is_taken_from_the_catalogue() -> None:
-    """Where the verdict does not say what tells a family apart, the catalogue does."""
-    one = ledger(block([entry("offset", family=["offset", "com_bias"])]), EFFECTS, auto=True)
-    assert len(one.apart) == 1
-    assert one.apart[0].startswith("offset or com_bias: ")
-    assert EFFECTS["offset"].separated in one.apart[0]
+    """What tells a family apart is what the catalogue says of its members."""
+    said = separated(["offset", "com_bias"], EFFECTS)
+    assert said.startswith("offset or com_bias: ")
+    assert EFFECTS["offset"].separated in said
+    assert EFFECTS["com_bias"].separated in said
 
 
 def test_several_effects() -> None:

@@ -1,6 +1,6 @@
 """What the verdict says of one axis and ledger, in words: what is missing, how sure that is, what to record and what to type next."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from plumbline.effects import Effect
@@ -51,7 +51,7 @@ def ledger(block: Block, effects: Effects, auto: bool, judged: str = "trials") -
     return Ledger(
         tone, _head(tone, missing, effects, bool(block["noise_floor_mm"])), _text(tone, block, len(cannot), judged),
         [_item(m, missing, effects, auto) for m in missing],
-        list(block["separate"] if "separate" in block else _apart(missing, effects)),
+        list(block.get("separate", [])),
         [] if auto else [f"plumbline add {m['effect']}" for m in missing if _to_add(m)],
         [_refused(r) for r in block.get("refused") or []], cannot,
     )  # fmt: skip
@@ -183,14 +183,6 @@ def scaled(value: float, unit: str) -> tuple[str, float, str]:
 def minus(text: str) -> str:
     """With a minus sign that is as long as a plus sign."""
     return text.replace("-", "\u2212", 1) if text.startswith("-") else text
-
-
-def _apart(missing: Sequence[Block], effects: Effects) -> Iterator[str]:
-    """Recordings that tell the members of each family apart, as the catalogue has them."""
-    for family in (m["family"] for m in missing):
-        ways = dict.fromkeys(effects[k].separated for k in family if k in effects and effects[k].separated)
-        if len(family) > 1 and ways:
-            yield f"{listed(family, 'or')}: {'; '.join(ways)}"
 
 
 def _refused(one: Block) -> str:
