@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import stdtr
 
-from plumbline.contest import Case, Set, decisive
+from plumbline.contest import Case, Set, chance, decisive
 from plumbline.physics import G
 
 LEAST = 0.0003  # [m] a constant below it is nobody's business
@@ -16,6 +16,8 @@ CLEAR = 0.5  # [1] of what is left beside it
 SURE = 4.0  # [1] standard errors
 LEANING = 0.2  # [1] of a tilt's constant that may stand on the moment side too: the body leans with it
 FOOT = 0.002  # [m] by which a person stands on the one side of both feet
+CHANCE = 0.01  # p of no such effect, below which it may take a constant with it
+TAKES = 0.5  # [1] of the constant that may be left then
 TELLS = 9.0  # [1] difference of squared distances in standard errors that tells a CoP from a CoM
 
 
@@ -65,8 +67,18 @@ def constants(case: Case, members: Set, feet: Sequence[Sequence[float]]) -> list
         least += LEANING * level.rms / w2
     level = _level(case, members, "=moment")
     if level.rms > least and level.rms > SURE * level.error and level.rms > clear * rest.get("moment", rest["whole"]):
-        out.append(_moment(level, feet, alone=len(case.equations) == 1))
+        out.append(_moment(level, feet, _takers(case, members, level.rms), alone=len(case.equations) == 1))
     return out
+
+
+def _takers(case: Case, members: Set, rms: float) -> Set:
+    """Effects that would take most of the moment side's constant with them: a CoP that is scaled is also shifted, where a person stands."""
+    others = (k for k in case.rivals if case.effects[k].recorded and k not in members)
+    return tuple(
+        k for k in others
+        if chance(case, (*members, k), k) < CHANCE and not case.refusal((*members, k), k)
+        and _level(case, (*members, k), "=moment").rms < TAKES * rms
+    )  # fmt: skip
 
 
 def _level(case: Case, members: Set, column: str) -> _Level:
@@ -79,8 +91,8 @@ def _level(case: Case, members: Set, column: str) -> _Level:
     return _Level(float(each.mean()), error, rms, 2 * float(stdtr(few, -rms / max(error, 1e-300))))
 
 
-def _moment(level: _Level, feet: Sequence[Sequence[float]], *, alone: bool) -> Constant:
-    """Constant of x - p: a CoP that is shifted moves under both feet, a CoM does not."""
+def _moment(level: _Level, feet: Sequence[Sequence[float]], takers: Set = (), *, alone: bool) -> Constant:
+    """Constant of x - p: a CoP that is shifted moves under both feet, a CoM does not.  takers: effects that bring such a constant."""
     offset = -level.mean
     known = np.array([np.nanmean(f) for f in feet if np.isfinite(f).any()])
     family: Set = ("offset", "com_bias", *(("tilt",) if alone else ()))
@@ -90,7 +102,8 @@ def _moment(level: _Level, feet: Sequence[Sequence[float]], *, alone: bool) -> C
         tells = (known.mean() / error) ** 2 - ((known.mean() - offset) / error) ** 2
         if abs(tells) > TELLS:
             family = ("offset",) if tells > 0 else family[1:]
-    effect = family[0] if len(family) == 1 or (len(known) and len(family) == 2) else ""
+    effect = family[0] if not takers and (len(family) == 1 or (len(known) and len(family) == 2)) else ""
+    family = (*family, *takers)
     half = 2 * level.error
     about = {
         "offset": {"b": (offset, offset - half, offset + half)},

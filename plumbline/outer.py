@@ -33,7 +33,7 @@ ALWAYS = 0.9  # [1] of a trial
 SIDE = 0.9  # [1] of its square that must have one sign
 EVEN = 0.02  # [1] by which a force to the side may vary while it acts, beside noise; what carries weight can be nothing else
 EVEN_NOISE = 1.5  # [1] times the noise, the same
-FULL = 0.2  # [1] of its usual size, from which on a contact that the record cuts short acts for sure
+FULL = 0.2  # [1] of its usual size, from which on a load that the record cuts short is one: bodies bounce
 GAP = 1.5  # [1] of the distance of windows, from which on there is one between them
 LOWER = 0.9  # [1] of the error without it, which it must reach
 LONG = 0.3  # [s] that it must act at a time
@@ -75,9 +75,10 @@ def find(windows: Sequence[Weak], faults: float) -> Contact | None:
     down = _centred([w.vertical if upright else np.zeros(len(w.time)) for w in windows])
     known = [w.floor("kinematic", 0.1) for w in windows]
     noise = float(np.sqrt(np.mean(known))) if np.isfinite(known).all() else float(np.median(np.abs(np.concatenate(side))))
-    lateral = _acts(windows, side, max(LOUD * np.hypot(noise, faults), LATERAL * G), float(noise))
+    seen = LOUD * float(np.hypot(noise, faults))
+    lateral = _acts(windows, side, max(seen, LATERAL * G), float(noise), seen)
     floor = float(np.sqrt(np.mean([np.nan_to_num(w.floor("vertical", 0.1)) for w in windows])))
-    vertical = _acts(windows, down, max(LOUD * floor, LOAD * G), np.inf)
+    vertical = _acts(windows, down, max(LOUD * floor, LOAD * G), np.inf, LOAD * G)
     if lateral is None and vertical is None:
         return None
     loud = tuple(_widened(w, m) for w, m in zip(windows, _either(lateral, vertical, windows), strict=True))
@@ -106,8 +107,11 @@ def _either(a: list[Mask] | None, b: list[Mask] | None, windows: Sequence[Weak])
     return [x | y for x, y in zip(a or nothing, b or nothing, strict=True)]
 
 
-def _acts(windows: Sequence[Weak], residual: Sequence[Array], least: float, noise: float) -> list[Mask] | None:
-    """Windows in which a residual is a contact's, of each trial; None where it is not one.  noise: by which it may vary while it acts."""
+def _acts(windows: Sequence[Weak], residual: Sequence[Array], least: float, noise: float, cut: float) -> list[Mask] | None:
+    """Windows in which a residual is a contact's, of each trial; None where it is not one.
+
+    noise: by which it may vary while it acts.  cut: from which on it acts where the record cuts it short.
+    """
     masks = [_runs(np.abs(r) > least, w.time) for r, w in zip(residual, windows, strict=True)]
     masks = [m & (m.mean() < ALWAYS) for m in masks]  # all through a trial: a fault of the record would look the same
     loud, every = np.concatenate(masks), np.concatenate(list(residual))
@@ -121,8 +125,8 @@ def _acts(windows: Sequence[Weak], residual: Sequence[Array], least: float, nois
     if _uneven(windows, residual, masks) > max(EVEN, EVEN_NOISE * noise / size):
         return None
     side = np.sign(every[loud].sum())  # seen elsewhere, it may also be seen where the record ends or begins
-    cut = [_runs(r * side > least, w.time, full=r * side > FULL * size) for r, w in zip(residual, windows, strict=True)]
-    return [m | c for m, c in zip(masks, cut, strict=True)]
+    ends = [_runs(r * side > cut, w.time, full=r * side > FULL * size) for r, w in zip(residual, windows, strict=True)]
+    return [m | c for m, c in zip(masks, ends, strict=True)]
 
 
 def _runs(loud: Mask, time: Array, *, full: Mask | None = None) -> Mask:
