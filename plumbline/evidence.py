@@ -251,22 +251,28 @@ def _rows(w: Weak) -> pd.DataFrame:
 
 def from_table(table: pd.DataFrame) -> Iterator[Weak]:
     """Windows of each trial and axis of the table `evidence`."""
+    parts = [c for c in table.columns if ":" in c]
+    values, at = np.nan_to_num(table[parts].to_numpy(float)), {c: k for k, c in enumerate(parts)}
     sizes: dict[str, int] = {}
-    for column in table.columns:
+    for column in parts:
         if column.endswith(":plain"):
             name, k = column.removesuffix(":plain").rsplit(".", 1)
             sizes[name] = max(sizes.get(name, 0), int(k) + 1)
-    for key, rows in table.groupby(["subject", "axis", "trial"], sort=True, observed=True):
-        yield _weak(str(key[2]), rows, sizes)
+    for key, rows in table.reset_index(drop=True).groupby(["subject", "axis", "trial"], sort=True, observed=True):
+        yield _weak(str(key[2]), rows, sizes, values[rows.index], at)
 
 
-def _weak(trial: str, rows: pd.DataFrame, sizes: Mapping[str, int]) -> Weak:
+def _weak(trial: str, rows: pd.DataFrame, sizes: Mapping[str, int], values: Array, at: Mapping[str, int]) -> Weak:
+    """Windows of one trial.  values: (n, k), columns of the effects' parts.  at: where each of them is."""
     first, lacking = rows.iloc[0], json.loads(rows["lacking"].iloc[0])
     nothing = np.zeros(len(rows))
+
+    def column(name: str, k: int, part: str) -> Array:
+        here = at.get(f"{name}.{k}:{part}")
+        return nothing if here is None else values[:, here]
+
     terms = {
-        name: {
-            part: np.column_stack([np.nan_to_num(rows.get(f"{name}.{k}:{part}", nothing)) for k in range(size)]) for part in PARTS
-        }
+        name: {part: np.column_stack([column(name, k, part) for k in range(size)]) for part in PARTS}
         for name, size in sizes.items() if name not in lacking
     }  # fmt: skip
     texts = {k: str(first[k]) for k in ("subject", "task", "condition", "axis", "use")}
