@@ -16,6 +16,7 @@ CLEAR = 0.5  # [1] of what is left beside it
 SURE = 4.0  # [1] standard errors
 LEANING = 0.2  # [1] of a tilt's constant that may stand on the moment side too: the body leans with it
 FOOT = 0.002  # [m] by which a person stands on the one side of both feet
+SCALE = 0.005  # [1] to which the scale of a CoP is told
 CHANCE = 0.01  # p of no such effect, below which it may take a constant with it
 TAKES = 0.5  # [1] of the constant that may be left then
 TELLS = 9.0  # [1] difference of squared distances in standard errors that tells a CoP from a CoM
@@ -47,8 +48,10 @@ class _Level:
     p: float
 
 
-def constants(case: Case, members: Set, feet: Sequence[Sequence[float]]) -> list[Constant]:
+def constants(case: Case, members: Set, feet: Sequence[Sequence[float]], place: float) -> list[Constant]:
     """Effects that are constants.  members: of the model.  feet: CoP from the middles of the feet, of each subject and trial [m].
+
+    place: how far from the laboratory's origin people stand [m]: by as much does a constant err beside a CoP that is scaled from there.
 
     Nothing where a contact with a place of its own stands in the model: it takes the constants.
     """
@@ -56,6 +59,7 @@ def constants(case: Case, members: Set, feet: Sequence[Sequence[float]]) -> list
         return []
     noise = float(case.floor[-1])
     least = max(LEAST, FLOORS * noise) if np.isfinite(noise) else UNKNOWN
+    least += SCALE * place * ("gain" in members)
     clear = CLEAR if np.isfinite(noise) else 1.0
     out = []
     rest = dict(zip(case.equations, np.sqrt(case.inside(members)), strict=True))

@@ -24,6 +24,7 @@ TWINS = 0.97  # [1] correlation of what two effects add beyond the base, from wh
 ABSORBED = 0.995  # [1] share of an effect that the base takes
 MODEL = 0.01  # [1] of the paper's error that a model may leave before it is worth a word
 SPARED = 0.3  # [1] of the tolerance that is added before variances are compared
+CONSTANT = ("=kinematic", "=moment", "=vertical")
 APART = (("gain", "hand"), ("force_scale", "hand"), ("gain", "com_bias"), ("force_scale", "com_bias"), ("gain", "force_scale"))
 """Pairs that these equations cannot tell from a common factor of both sides."""
 
@@ -205,11 +206,14 @@ def projected(s: Sums, weight: Array, base: Index, mine: Index) -> Array:
 
 
 def beyond(all_sums: Sequence[Sums], weight: Array, name: str, base: Set = ()) -> float:
-    """Largest share of an effect's columns that the base (with some effects) does not take; 1 over it is the variance inflation."""
+    """Largest share of an effect's columns that the base (with some effects) does not take; 1 over it is the variance inflation.
+
+    Of what varies: a column's mean, which depends on where the laboratory's origin lies, is no part of it.
+    """
     shares = []
     for s in all_sums:
         mine = own(s, name)
-        whole = np.einsum("e,ecij->ij", weight, s.gram)[mine, mine]
+        whole = np.diag(projected(s, weight, own(s, *CONSTANT), mine))
         left = np.diag(projected(s, weight, s.of(base), mine))
         shares.append(max((a / b for a, b in zip(left, whole, strict=True) if b > 0), default=0.0))
     return float(np.mean(shares))

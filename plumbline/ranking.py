@@ -102,11 +102,12 @@ class _Made(Sequence[Sequence[Weak]]):
 def _judge(windows: Sequence[Sequence[Weak]], effects: Mapping[str, Effect], w2: Sequence[float], h: Sequence[float]) -> Finding:
     every = {**effects, **SHAPES}
     lacking: dict[str, str] = {}
-    feet = []
+    feet, places = [], []
     for ws in windows:
         every = {k: e for k, e in every.items() if all(k in w.terms for w in ws)}
         lacking |= {k: v for w in ws for k, v in w.lacking.items() if k not in SHAPES}
         feet.append([w.feet for w in ws])
+        places.append(abs(float(np.mean([w.zmp.mean() for w in ws]))))
     offered = [k for k in every if k not in CONSTANTS and k != CONTACT]
     with TemporaryDirectory() as folder:
         made = (sums(ws, offered, w, k) for ws, w, k in zip(windows, w2, h or [LEANS / w for w in w2], strict=True))
@@ -116,7 +117,7 @@ def _judge(windows: Sequence[Sequence[Weak]], effects: Mapping[str, Effect], w2:
         case, absorbed = case_of(all_sums, {**effects, **SHAPES}, offered, faults)
         best, refused = search(case)
         members = pruned(case, _plain(case, pruned(case, best)))
-        return _finding(case, members, refused, absorbed, lacking, feet)
+        return _finding(case, members, refused, absorbed, lacking, (feet, max(places)))
 
 
 def _plain(case: Case, members: Set) -> Set:
@@ -165,7 +166,7 @@ def _parts_left(case: Case, over: Mapping[str, float]) -> tuple[str, ...]:
 
 def _finding(
     case: Case, members: Set, refused: Sequence[Refused], absorbed: Mapping[str, str], lacking: Mapping[str, str],
-    feet: Sequence[Sequence[float]],
+    stand: tuple[Sequence[Sequence[float]], float],
 ) -> Finding:  # fmt: skip
     needs = {n: need(case, members, n) for n in (*members, *case.settled) if n in members or not case.twins[n] & set(members)}
     named = [n for n in (*members, *case.settled) if n in needs and n not in SHAPES and _matters(case, members, n, needs[n])]
@@ -179,7 +180,7 @@ def _finding(
         refused = [*refused, *(Refused((n,), float("nan"), "small beside what nobody explains") for n in doubtful)]
         named = [n for n in named if n not in doubtful]
     whole = len(case.equations) - 1
-    kept = constants(case, members, feet) if CONSTANTS[0] not in lacking and not (left or shapes) else []
+    kept = constants(case, members, *stand) if CONSTANTS[0] not in lacking and not (left or shapes) else []
     if kept and not _lowered(case, (*members, *named), {c for one in kept for c in one.columns}):
         kept = []
     silent = tuple({"=moment", "=kinematic"} - {c for one in kept for c in one.columns})

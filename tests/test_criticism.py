@@ -236,3 +236,20 @@ def test_a_contact_cut_short_by_the_end_of_the_record_counts_where_it_is_seen_el
     assert kept[36:40].all()
     assert not kept[-3:].any()
     assert outer._runs(loud, time, full=loud)[-3:].all()
+
+
+@pytest.mark.parametrize(("q", "shift"), [(0.0, 0.0), (0.005, 0.0), (0.05, 0.0), (0.0, 0.006)])
+def test_where_the_laboratorys_origin_lies_does_not_matter(shared_data: Path, q: float, shift: float) -> None:
+    """A person 0.5 m from the origin: nothing on clean data; a scale of the CoP that shows is named as it is at the origin, a shift too."""
+    got = disclosed(shared_data / "hidden_effect" / "clean")
+    there = {c: got.signals[c] + 0.5 for c in ("com_x", "zmp_x", "cop_left_x", "cop_right_x", "limit_left", "limit_right")}
+    there |= {c: (1 + q) * there[c] + shift for c in ("zmp_x", "cop_left_x", "cop_right_x")}
+    _, finding = settled(got.signals.assign(**there), got.pushes, got.coverage, EFFECTS, EVALUATION, "lateral")
+    assert finding is not None
+    assert (finding.left, finding.shapes) == ((), ())
+    if q > 0.01:
+        assert names(finding) == {"gain"}
+        assert finding.found[0].parameters["q"][0] == pytest.approx(q, abs=0.01)
+    else:
+        assert [f.family[0] for f in finding.found] == ["offset"] * bool(q + shift)
+        assert not shift or finding.found[0].family == ("offset",)
