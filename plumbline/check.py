@@ -8,7 +8,8 @@ from typing import NamedTuple
 import pandas as pd
 
 from plumbline import markerset
-from plumbline.config import study_config
+from plumbline.config import models, study_config
+from plumbline.effects import catalogue
 from plumbline.recording import tables_of
 from plumbline.study import Study, check_comparison, find
 
@@ -28,6 +29,7 @@ def lines(folder: Path) -> Iterator[Line]:
     """
     config = study_config(folder)
     study = find(folder, config["raw"])
+    models(config, catalogue(folder))
     check_comparison(study.trials, config["evaluation"]["train"], config["evaluation"]["test"])
     read = 0
     for trial in study.trials:

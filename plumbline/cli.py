@@ -119,7 +119,7 @@ def effects(name: str | None, ledger: str | None, study: Path) -> None:
     known = catalogue(study.resolve())
     if name is not None:
         known_effect(name, known)
-    own = frozenset(f.stem for f in (study / "effects").glob("*.py"))
+    own = frozenset(k for k, e in known.items() if e.file and Path(e.file).parent == study.resolve() / "effects")
     for text in full(known[name]) if name else listing(known, ledger, own):
         click.echo(text)
     for file, error in known.broken:

@@ -97,7 +97,7 @@ def known_effect(effect: str, known: "Catalogue", place: str = "") -> None:
             raise PlumblineError(f"{place}{file} cannot be used: {error}")
     if effect in known:
         return
-    near = get_close_matches(effect, known, n=1, cutoff=0.5)
+    near = get_close_matches(effect.lower(), known, n=1, cutoff=0.5)
     advice = f"did you mean '{near[0]}'?" if near else "`plumbline effects` lists them"
     raise PlumblineError(f"{place}no effect is called '{effect}': {advice}")
 

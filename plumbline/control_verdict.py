@@ -51,7 +51,9 @@ def judge(
         "base_error_mm": sums.error(""), "model_error_mm": sums.error(wanted), "final_error_mm": sums.error(found),
         "noise_floor_mm": sums.error(best, "fitted_square_sum"), "missing": missing, "unexplained": left is not None,
         "description": _described(left, sums, found, known) if left else "", "reason": _reason(missing, sums, found),
-        "cannot_judge": {k: ", ".join(e.needs) for k, e in known.items() if e.ledger == "control" and not e.law},
+        "cannot_judge": {
+            k: f"needs {', '.join(e.needs)}" for k, e in known.items() if e.ledger == "control" and not e.law
+        },
         "separate": [separated(m["family"], known) for m in missing if len(m["family"]) > 1],
     }  # fmt: skip
     return block if settled or not (missing or left) else block | UNSETTLED
@@ -101,7 +103,7 @@ def trials(table: pd.DataFrame, names: Sequence[str]) -> tuple[Array, Array]:
 def _unjudged(reason: str) -> dict[str, Any]:
     """The block where nothing can be said."""
     errors: dict[str, Any] = dict.fromkeys(("base_error_mm", "model_error_mm", "final_error_mm", "noise_floor_mm"))
-    return errors | {"missing": None, "unexplained": None, "description": "", "reason": reason}
+    return errors | {"missing": None, "unexplained": None, "description": "", "reason": reason, "cannot_judge": {}, "separate": []}
 
 
 def _described(left: "_Step", sums: "_Sums", found: str, known: Mapping[str, Effect]) -> str:

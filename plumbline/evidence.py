@@ -167,7 +167,8 @@ def of_one(about: Any, channels: Channels, axis: str, plant: Plant, effects: Map
         if all(np.isfinite(v).all() for v in weak.values()):
             terms[name] = weak
         else:
-            lacking[name] = f"{', '.join(effect.needs)} without gaps"
+            gaps = [need for need in effect.needs if not np.isfinite(channels[need]).all()]
+            lacking[name] = f"{', '.join(gaps)} without gaps" if gaps else "columns without NaN"
     x, z = channels.com_x, channels.com_z
     vertical = mean(z, bump.curvature) + channels.g - mean(channels.grf_z) / channels.mass
     key = (about["trial"], about["subject"], about["task"], about["condition"], axis)
@@ -215,10 +216,14 @@ def _parts(effect: Effect, c: Channels) -> dict[str, Array]:
     nothing = np.zeros(np.shape(plain))
     parts["force"] = effect.force(c) if effect.force is not None and c.has("grf_x") else nothing
     parts["vertical"] = effect.vertical(c) if effect.vertical is not None and c.has("grf_z") else nothing
+    number = np.shape(plain)[1] if np.ndim(plain) == 2 else 0
+    if effect.values is None and number > len(effect.parameters):
+        raise ValueError(f"columns gives {number} columns, the effect has {len(effect.parameters)} Parameter: one each, or say `values`")
     for part, values in parts.items():
         if np.ndim(values) != 2 or len(values) != len(c.time) or np.shape(values)[1] != np.shape(plain)[1]:
             want = f"{len(c.time)} rows and as many columns as `columns` has"
-            raise ValueError(f"{part} has the shape {np.shape(values)}; wanted are {want}: write (...)[:, None] or np.column_stack")
+            name = "columns" if part in ("plain", "by_w2") else part
+            raise ValueError(f"{name} has the shape {np.shape(values)}; wanted are {want}: write (...)[:, None] or np.column_stack")
     return parts
 
 

@@ -14,6 +14,7 @@ from plumbline.shapes import SHAPES
 
 Row = dict[str, Any]
 
+WHOLLY = 1000.0  # variance inflation of an effect that the others take
 MANY = 500  # trials that nobody records
 
 WHERE = {
@@ -121,7 +122,7 @@ def _separate(missing: Sequence[Row], rows: pd.DataFrame, effects: Mapping[str, 
     """What would tell the members of each family apart: another recording, or more trials like these."""
     about = rows.set_index("effect")
     for family in dict.fromkeys(tuple(entry["family"]) for entry in missing if len(entry["family"]) > 1):
-        alike = about.loc[[k for k in family[1:] if k in about.index]].dropna(subset=["vif"])
+        alike = about.loc[[k for k in family[1:] if k in about.index and about.loc[k, "status"] == "alike"]].dropna(subset=["vif"])
         more = "".join(_more_trials(str(k), row) for k, row in alike.iterrows())
         yield separated(family, effects) + more
 
@@ -129,7 +130,11 @@ def _separate(missing: Sequence[Row], rows: pd.DataFrame, effects: Mapping[str, 
 def _more_trials(effect: str, row: pd.Series) -> str:
     n = float(row["trials_80"])
     told = f"about {n:.0f} trials like these" if n < MANY else "no number of trials like these"
-    return f" ({effect}: variance inflation {row['vif']:.3g}; {told} would tell it with 80 % power)"
+    return f" ({effect}: variance inflation {_inflation(float(row['vif']))}; {told} would tell it with 80 % power)"
+
+
+def _inflation(vif: float) -> str:
+    return f"{vif:.3g}" if vif < WHOLLY else f"> {WHOLLY:g}"
 
 
 def describe(about: pd.Series) -> str:
@@ -158,6 +163,8 @@ def reason(unexplained: bool, named: bool, final: float, floor: float | None) ->
     if unexplained:
         return "structure above the noise is left on trials left out"
     if floor is None:
-        rest = "what is named falls by more than that between trials" if named else "no effect lowers the error on trials left out"
+        rest = (
+            "what is named lowers the error on trials left out beyond chance" if named else "no effect lowers the error on trials left out"
+        )
         return f"the noise floor is not known; {rest}"
     return f"{'with what is missing ' if named else ''}held-out error is {final / floor:.2f} of the noise floor"

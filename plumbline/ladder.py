@@ -202,7 +202,8 @@ def _control(said: Said, axis: str, subject: str, effects: Mapping[str, Effect],
 def blank(reason: str) -> dict[str, Any]:
     """A block that claims nothing."""
     errors: dict[str, Any] = dict.fromkeys(("base_error_mm", "model_error_mm", "final_error_mm", "noise_floor_mm"))
-    return errors | {"missing": None, "unexplained": None, "description": "", "reason": reason}
+    said = {"missing": None, "unexplained": None, "description": "", "reason": reason}
+    return errors | said | {"refused": [], "cannot_judge": {}, "separate": []}
 
 
 def _notes(floor: float, coverage: pd.DataFrame, judged: "pd.Series[bool]") -> Iterator[str]:

@@ -70,7 +70,8 @@ def of_part(
         trials = [Trial(w.trial, frozenset(called[w.trial])) for w in bench.windows]
         for number, (name, listed) in enumerate(chosen, 1):
             members = [m for m in listed if effects[m].ledger == "plant" and (m != CONTACT or bench.contact is not None)]
-            if listed and not members:  # a rung of the law, or a contact that is not seen in these data; no effects: the paper's own
+            # no effects: the paper's own; only the law's, a contact that is not seen, or what these data cannot judge: no rung
+            if (listed and not members) or not {*members} - {CONTACT} <= {*bench.offered}:
                 continue
             about_model = {"rung": number, "model": name, "effects": ", ".join(listed)}
             rungs += [row | about_model for row in bench.rung(members, trials, plants)]

@@ -253,3 +253,28 @@ def test_where_the_laboratorys_origin_lies_does_not_matter(shared_data: Path, q:
     else:
         assert [f.family[0] for f in finding.found] == ["offset"] * bool(q + shift)
         assert not shift or finding.found[0].family == ("offset",)
+
+
+def test_two_columns_of_one_parameter_are_told_and_not_used(shared_data: Path, tmp_path: Path) -> None:
+    """An effect whose second column nobody bounds takes part in nothing; the reason says what is wanted."""
+    (tmp_path / "effects").mkdir()
+    text = "import numpy as np\nfrom plumbline.effects import Effect, Parameter\n\n\ndef columns(c):\n"
+    text += "    return np.column_stack([c.com_x, c.zmp_x])\n\n\n"
+    text += 'EFFECT = Effect("t", "plant", "e", "s", ("com_x", "zmp_x"), (Parameter("k", "1"),), columns=columns)\n'
+    (tmp_path / "effects" / "two.py").write_text(text, encoding="utf-8")
+    got = disclosed(shared_data / "hidden_effect" / "clean")
+    _, finding = settled(got.signals, got.pushes, got.coverage, catalogue(tmp_path), EVALUATION, "lateral")
+    assert finding is not None
+    assert "2 columns, the effect has 1 Parameter" in finding.lacking["two"]
+    assert names(finding) == set()
+
+
+def test_a_model_that_cannot_be_computed_has_no_rung(shared_data: Path) -> None:
+    """Without segments there is no rung with angular momentum: a number would be another model's."""
+    got = disclosed(shared_data / "hidden_effect" / "ang_mom")
+    signals = got.signals.assign(ang_mom_x=np.nan, ang_mom_y=np.nan, ang_mom_z=np.nan)
+    table, alone, tried = of_part(signals, got.pushes, got.coverage, EFFECTS, EVALUATION)
+    judged, candidates = of_cohort(dict(tuple(table.groupby("subject"))), alone, tried, EFFECTS)
+    models = [("empty", ()), ("both", ("drift", "ang_mom")), ("drift", ("drift",))]
+    rows, _ = rungs.of_part(signals, got.pushes, got.coverage.assign(files=""), table, judged, candidates, EFFECTS, models, EVALUATION)
+    assert set(rows.loc[rows["axis"] == "lateral", "model"]) == {"empty", "drift"}

@@ -19,7 +19,7 @@ from plumbline.study import find
 
 EVALUATION = with_defaults({"evaluation": {"half_width": 0.3, "exponent": 3, "offset": "train", "w2": "height"}})["evaluation"]
 TASKS = {"static1": "static", "STS1": "sts", "squats1": "squats"}
-LOAD = 479.0  # [N] mean of what the seat carries, from the vertical equation of a plain plain script
+LOAD = 479.0  # [N] mean of what the seat carries, from the vertical equation of a plain script
 HIPS = ("L_HJC", "R_HJC")
 FOUND = ["axis", "effect", "family", "before", "after"]
 

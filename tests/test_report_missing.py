@@ -103,7 +103,7 @@ def test_not_judged() -> None:
     """Null is not judged, and is said not to mean that nothing is missing."""
     one = ledger(block(None, reason="too few trials"), EFFECTS, auto=True)
     assert (one.tone, one.head) == ("unjudged", "Not judged")
-    assert "not to say that nothing is" in one.text
+    assert "does not mean that nothing is" in one.text
 
 
 def test_impostors_and_what_cannot_be_judged() -> None:

@@ -63,7 +63,7 @@ def _load(file: Path) -> _Loaded:
     sys.modules[name] = module
     try:
         spec.loader.exec_module(module)
-    except Exception as error:  # a user's file may fail in any way; the reason is handed on whole
+    except (Exception, SystemExit) as error:  # a user's file may fail in any way; the reason is handed on whole
         return _Loaded(None, where(error, file))
     effect = getattr(module, "EFFECT", None)
     if not isinstance(effect, Effect):
@@ -76,4 +76,5 @@ def where(error: BaseException, file: Path) -> str:
     line = error.lineno if isinstance(error, SyntaxError) and error.filename == str(file) else None
     for frame in traceback.extract_tb(error.__traceback__):
         line = frame.lineno if frame.filename == str(file) else line
-    return f"{f'line {line}: ' if line else ''}{type(error).__name__}: {error}"
+    said = error.msg if isinstance(error, SyntaxError) else error
+    return f"{f'line {line}: ' if line else ''}{type(error).__name__}: {said}"

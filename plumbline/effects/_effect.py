@@ -43,7 +43,8 @@ class Parameter:
     def refusal(self, value: float) -> str:
         """Why a value cannot be this parameter, in words; empty where it can."""
         if not self.lower <= value <= self.upper:
-            return f"{self.name} = {value:.3g} {self.unit} is not possible (from {self.lower:g} to {self.upper:g})"
+            unit = "" if self.unit == "1" else f" {self.unit}"
+            return f"{self.name} = {value:.3g}{unit} is not possible (from {self.lower:g} to {self.upper:g})"
         if self.physics is not None and abs(value - self.physics) > self.within:
             return f"{self.name} = {value:.3g}, physics says {self.physics:g}"
         return ""

@@ -24,7 +24,7 @@ def values(theta: Array, constant: float) -> Array:
 EFFECT = Effect(
     title="Forces too large by a factor",
     ledger="plant",
-    equation=r"0, \qquad \text{kinematic: } -s\,F_x/m",
+    equation=r"0, \qquad \text{kinematic: } -\frac{s}{1 + s}\,F_x/m",
     source="F recorded as (1 + s) F, or a body mass that is wrong",
     needs=("grf_x", "com_x"),
     parameters=(Parameter("s", "1", -0.3, 0.3, matters=0.015),),

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 from plumbline.effects import Effect
 from plumbline.report.words import number, plural
+from plumbline.shapes import SHAPES
 
 Block = Mapping[str, Any]
 Effects = Mapping[str, Effect]
@@ -97,7 +98,7 @@ def listed(names: Sequence[str], word: str) -> str:
 
 def _text(tone: str, block: Block, cannot: int, judged: str) -> str:
     if tone == "unjudged":
-        return "Nothing is said of what is missing; that is not to say that nothing is."
+        return "Not judged, so nothing is said of what is missing. It does not mean that nothing is."
     if tone == "unexplained":
         return _left(str(block["description"]))
     if tone == "missing":
@@ -146,7 +147,7 @@ def _fall(entry: Block, several: bool) -> str:
 def _sure(q: float | None) -> str:
     if q is None or q != q:
         return ""
-    return f"False discovery rate over the catalogue: q {rate(q)}."
+    return f"How often a name as sure as this is wrong: q {rate(q)} (false discovery rate over the catalogue)."
 
 
 def rate(q: float) -> str:
@@ -187,7 +188,7 @@ def minus(text: str) -> str:
 
 def _refused(one: Block) -> str:
     """An impostor and why it was not believed."""
-    names = " with ".join(one["effects"])
+    names = " with ".join(SHAPES[k].title if k in SHAPES else k for k in one["effects"])
     error = number(one["error_mm"])
     would = f"would bring the error to {error} mm" if error else "would lower the error"
     return f"{names} {would}. Refused: {one['reason'].rstrip('.')}."
