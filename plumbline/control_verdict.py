@@ -5,7 +5,8 @@ summed over subjects, if it gains enough to count and to matter. Effects that ga
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from plumbline.control_shapes import SHAPES
+from plumbline.effects import HERE as LIBRARY
 from plumbline.effects import Effect, catalogue
 from plumbline.effects_text import separated
 from plumbline.false_discovery import false_discovery_rate
@@ -51,12 +53,20 @@ def judge(
         "base_error_mm": sums.error(""), "model_error_mm": sums.error(wanted), "final_error_mm": sums.error(found),
         "noise_floor_mm": sums.error(best, "fitted_square_sum"), "missing": missing, "unexplained": left is not None,
         "description": _described(left, sums, found, known) if left else "", "reason": _reason(missing, sums, found),
-        "cannot_judge": {
-            k: f"needs {', '.join(e.needs)}" for k, e in known.items() if e.ledger == "control" and not e.law
-        },
+        "cannot_judge": dict(_not_judged(known, sums)),
         "separate": [separated(m["family"], known) for m in missing if len(m["family"]) > 1],
     }  # fmt: skip
     return block if settled or not (missing or left) else block | UNSETTLED
+
+
+def _not_judged(known: Mapping[str, Effect], sums: "_Sums") -> Iterator[tuple[str, str]]:
+    """Effects of the law that were not tried, and what they need."""
+    tried = {n for name in sums.names for n in name.split("+")}
+    for name, effect in known.items():
+        if effect.ledger == "control" and not effect.law:
+            yield name, f"needs {', '.join(effect.needs)}"
+        elif effect.ledger == "control" and name not in tried and effect.file and Path(effect.file).parent != LIBRARY:
+            yield name, "needs its file to be put right: its law cannot be simulated, results/logs/control says why"
 
 
 UNSETTLED: dict[str, Any] = {

@@ -134,7 +134,10 @@ EFFECT = Effect(
 
 
 def test_what_stands_in_no_catalogue_is_unexplained_until_the_user_adds_it(tmp_path: Path) -> None:
-    """k1 40 % larger on the right: nothing named, `unexplained`; a study's own effect file is named, (s = 0.4 / 2.4), the error falls."""
+    """k1 40 % larger on the right: nothing named, `unexplained`; a study's own effect file is named, (s = 0.4 / 2.4), the error falls.
+
+    A law of the study's own that fails is listed as not judged, and the others go on.
+    """
     tables = person(tmp_path, 22, LAW, quirks=Quirks(lopsided=0.4))
     block = judge(ledger(tables))
     assert block["missing"] == []
@@ -142,12 +145,15 @@ def test_what_stands_in_no_catalogue_is_unexplained_until_the_user_adds_it(tmp_p
     assert "differs between the sides" in block["description"]
     (tmp_path / "effects").mkdir()
     (tmp_path / "effects" / "strong_leg.py").write_text(OWN)
+    (tmp_path / "effects" / "late.py").write_text(OWN.replace("np.abs(far)", "np.abs(fra)"))
     own = catalogue(tmp_path)
     block = judge(ledger(tables, effects=own), effects=own)
     assert [m["effect"] for m in block["missing"]] == ["strong_leg"]
     assert not block["unexplained"]
     assert block["missing"][0]["parameters"]["s"]["value"] == pytest.approx(0.4 / 2.4, abs=0.03)
     assert block["final_error_mm"] < 0.7 * block["base_error_mm"]
+    assert "its law cannot be simulated" in block["cannot_judge"]["late"]
+    assert "ankle_moment_left" in block["cannot_judge"]["legs"]
 
 
 def test_the_disclosed_delay(shared_data: Path) -> None:
