@@ -133,9 +133,9 @@ def _joined(found: str, name: str) -> str:
 
 
 def _reason(missing: Sequence[Mapping[str, Any]], sums: "_Sums", found: str) -> str:
-    floor = "the floor is what the feedback noise left by the best law makes of the CoM"
+    floor = "the floor is the error of the CoM that noise of the feedback makes under the best law found"
     if not missing:
-        return f"no listed effect predicts trials left out enough better than the base law to be named; {floor}"
+        return f"no effect predicts trials left out enough better than the base law; {floor}"
     share = 1 - sums.score(found).sum() / sums.score("").sum()
     names = " and ".join(" or ".join(m["family"]) for m in missing)
     return f"{names} takes {100 * share:.0f} % off the ZMP's squared error on trials left out, freed of its colour; {floor}"

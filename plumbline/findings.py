@@ -123,14 +123,14 @@ def _separate(missing: Sequence[Row], rows: pd.DataFrame, effects: Mapping[str, 
     about = rows.set_index("effect")
     for family in dict.fromkeys(tuple(entry["family"]) for entry in missing if len(entry["family"]) > 1):
         alike = about.loc[[k for k in family[1:] if k in about.index and about.loc[k, "status"] == "alike"]].dropna(subset=["vif"])
-        more = "".join(_more_trials(str(k), row) for k, row in alike.iterrows())
-        yield separated(family, effects) + more
+        yield separated(family, effects)
+        yield from (_more_trials(family[0], str(k), row) for k, row in alike.iterrows())
 
 
-def _more_trials(effect: str, row: pd.Series) -> str:
+def _more_trials(effect: str, other: str, row: pd.Series) -> str:
     n = float(row["trials_80"])
     told = f"about {n:.0f} trials like these" if n < MANY else "no number of trials like these"
-    return f" ({effect}: variance inflation {_inflation(float(row['vif']))}; {told} would tell it with 80 % power)"
+    return f"{effect} from {other}: {told} would tell them apart with 80 % power (variance inflation {_inflation(float(row['vif']))})"
 
 
 def _inflation(vif: float) -> str:

@@ -140,9 +140,9 @@ def _search(candidates: pd.DataFrame) -> str:
     return (
         f"What the equation lacks was searched for among {plural(count, 'listed effect')}, alone and in small sets, in the weak form of "
         "the equation; where the shear force was recorded the kinematic side (x'' against Fx/m) and the moment side were judged apart. An "
-        "effect is named where it predicts trials left out better than chance (p < 0.05, tests clustered by trial; q, the same over "
-        "the list after Benjamini and Hochberg 1995, is told beside it), by an amount that matters against the noise floor, and with "
-        "a size and sign that are physically possible. Effects that these data cannot tell apart are named together."
+        "effect is named where it differs from zero beyond chance (false discovery rate over the list below 5 %, Benjamini and Hochberg "
+        "1995; covariance from whole trials left out), lowers the error on trials left out by an amount that matters against the noise "
+        "floor, and has a size and sign that are physically possible. Effects that these data cannot tell apart are named together."
     )
 
 

@@ -128,6 +128,8 @@ def _item(entry: Block, missing: Sequence[Block], effects: Effects, auto: bool) 
         lines.append("These data cannot tell which of them it is.")
     elif others:
         lines.append(f"These data cannot tell it from {listed([titled(k, effects) for k in others], 'or')}.")
+    else:
+        lines.append("No other effect of the catalogue would explain it as well.")
     lines.append(_sure(entry.get("q_value")))
     if effect and entry["in_model"]:
         lines.append("It was added by itself (models: auto)." if auto else "The configured model has it.")
