@@ -171,7 +171,11 @@ def _value(name: str, said: Block, effect: Effect | None) -> str:
     if low is not None and high is not None and low == low and high == high:
         out += f" (95 % interval {minus(number(factor * low))} to {minus(number(factor * high))}{unit})"
     physics = next((p.physics for p in effect.parameters if p.name == name), None) if effect else None
-    return out + (f"; physics says {minus(f'{physics:g}')}." if physics is not None else ".")
+    if physics is None:
+        return out + "."
+    out += f"; physics says {minus(f'{physics:g}')}."
+    outside = low is not None and high is not None and not low <= physics <= high
+    return out + (" The interval counts chance from trial to trial, not what a body model is wrong by." if outside else "")
 
 
 def scaled(value: float, unit: str) -> tuple[str, float, str]:
