@@ -166,5 +166,5 @@ def reason(unexplained: bool, named: bool, final: float, floor: float | None) ->
         rest = (
             "what is named lowers the error on trials left out beyond chance" if named else "no effect lowers the error on trials left out"
         )
-        return f"the noise floor is not known; {rest}"
+        return rest
     return f"{'with what is missing ' if named else ''}held-out error is {final / floor:.2f} of the noise floor"
