@@ -155,8 +155,14 @@ class _Bench:
     def fit(self, members: Sequence[str], among: NDArray[np.bool_] | None = None) -> Fit:
         """Coefficients of a model over some pieces."""
         columns = self.sums.of([m for m in members if m in self.offered])
-        known = {int(own(self.sums, "=h")[0]): self._height()} if self.fixed else {}
-        return fit(self.sums, self.weight, columns, among=among, known=known)
+        h = int(own(self.sums, "=h")[0])
+        got = fit(self.sums, self.weight, columns, among=among, known={h: self._height()} if self.fixed else {})
+        if self.fixed:
+            return got
+        # a rung is judged by the whole equation, as the paper's is: its one w2 is fitted there, beside what the effects are known to add
+        others = {int(c): float(v) for c, v in zip(got.columns, got.theta, strict=True) if c != h}
+        whole = np.array([float(e == "whole") for e in self.sums.equations])
+        return fit(self.sums, whole, columns, among=among, known=others)
 
     def _height(self) -> float:
         """z over g at the mean height [s2]."""
