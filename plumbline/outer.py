@@ -142,20 +142,20 @@ def _runs(loud: Mask, time: Array, *, full: Mask | None = None) -> Mask:
 
 
 def _uneven(windows: Sequence[Weak], residual: Sequence[Array], masks: Sequence[Mask]) -> float:
-    """Scatter of a contact around the mean of each time that it acts, in parts of it, away from its beginning and end.
+    """Scatter of a contact around its mean, in parts of it, away from its beginning and end: the median over the times that it acts.
 
     Where the body is and how it moves tells little: someone who is pushed stands elsewhere for as long. But a spring, a wall or a magnet
-    pulls more or less as the body moves, and a contact hardly does.
+    pulls more or less as the body moves, and a contact hardly does. A time that the record cuts short is all beginning: it tells nothing.
     """
-    scatter = size = 0.0
+    each = []
     for w, r, loud in zip(windows, residual, masks, strict=True):
         edges = np.flatnonzero(np.diff(np.concatenate([[0], loud.view(np.int8), [0]])))
         for a, b in zip(edges[::2], edges[1::2], strict=True):
             reach = min(w.bump.half_width, (w.time[b - 1] - w.time[a]) / 3)
             core = r[a:b][(w.time[a:b] >= w.time[a] + reach) & (w.time[a:b] <= w.time[b - 1] - reach)]
             if len(core) > 1:
-                scatter, size = scatter + float(np.sum((core - core.mean()) ** 2)), size + float(np.sum(core**2))
-    return float(np.sqrt(scatter / size)) if size else 1.0
+                each.append(np.sqrt(np.mean((core - core.mean()) ** 2) / np.mean(core**2)))
+    return float(np.median(each)) if each else 1.0
 
 
 def _widened(w: Weak, loud: Mask) -> Mask:

@@ -278,3 +278,15 @@ def test_a_model_that_cannot_be_computed_has_no_rung(shared_data: Path) -> None:
     models = [("empty", ()), ("both", ("drift", "ang_mom")), ("drift", ("drift",))]
     rows, _ = rungs.of_part(signals, got.pushes, got.coverage.assign(files=""), table, judged, candidates, EFFECTS, models, EVALUATION)
     assert set(rows.loc[rows["axis"] == "lateral", "model"]) == {"empty", "drift"}
+
+
+def test_one_time_that_the_record_cuts_short_does_not_hide_a_contact(shared_data: Path) -> None:
+    """Ten even times and one that is all ramp scatter by less than a contact may; ten springs by more."""
+    got = disclosed(shared_data / "hidden_effect" / "clean")
+    windows, _ = settled(got.signals, got.pushes, got.coverage, EFFECTS, EVALUATION, "lateral")
+    loud = [(w.time > w.time[0] + 0.5) & (w.time < w.time[-1] - 0.5) for w in windows]
+    even = [np.full(len(w.time), 0.4) for w in windows]
+    even[0] = np.linspace(0.1, 0.4, len(even[0]))
+    assert outer._uneven(windows, even, loud) < outer.EVEN
+    springs = [0.4 + 5 * (w.com - w.com.mean()) for w in windows]
+    assert outer._uneven(windows, springs, loud) > outer.EVEN
