@@ -116,7 +116,7 @@ def _judge(windows: Sequence[Sequence[Weak]], effects: Mapping[str, Effect], w2:
         faults = FAULT * motion(windows, all_sums[0].equations)
         case, absorbed = case_of(all_sums, {**effects, **SHAPES}, offered, faults)
         best, refused = search(case)
-        members = pruned(case, _plain(case, pruned(case, best)))
+        members = pruned(case, _plain(case, best))
         return _finding(case, members, refused, absorbed, lacking, (feet, max(places)))
 
 
