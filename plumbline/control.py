@@ -6,6 +6,7 @@ the plant ledger are taken out before: a force record 16 ms late looks like a re
 """
 
 import itertools
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 from plumbline.control_rows import blank, of_fit
 from plumbline.control_scene import FEWEST_LOCI, Known, Sizes, Stage, staged
 from plumbline.control_shapes import offered
+from plumbline.control_verdict import judge
 from plumbline.effects import HERE as LIBRARY
 from plumbline.effects import Effect, catalogue, where
 from plumbline.estimators import loop_error
@@ -52,6 +54,7 @@ def of_part(
     evaluation: Mapping[str, Any],
     corrected: Mapping[str, Sizes] | None = None,
     plant: Mapping[str, Sizes] | None = None,
+    acts: Mapping[str, Sequence[tuple[int, int]]] | None = None,
     effects: Mapping[str, Effect] | None = None,
     model: Sequence[str] = (),
 ) -> pd.DataFrame:
@@ -59,6 +62,7 @@ def of_part(
 
     corrected: subject -> {"sync": [0.016], ...}, instrument effects to take out of the CoM and the ZMP first.  plant: the same for what
     moves the body beside the ZMP ("ang_mom", "hand", ...): the CoM and its velocity at push end are then known better.
+    acts: trial -> first and last frame of each time that a contact beside the plates acts; loci that it touches are left out.
     effects: the catalogue, default the library's.  model: effects of the configured model; those of the control ledger are fitted
     together in any case.
     """
@@ -67,16 +71,60 @@ def of_part(
     known = {k: e for k, e in every.items() if e.ledger == "control" and e.law}
     rows: list[dict[str, Any]] = []
     lateral = loci[loci["task"] == TASK]
-    for key, mine in by_group(lateral):
+    for key, all_of_them in by_group(lateral):
         about = key._asdict()
-        settled = Known(dict((corrected or {}).get(key.subject, {})), dict((plant or {}).get(key.subject, {})), every)
-        found = staged(about, mine, signals, pushes, coverage, trust, clusters, controller, settled)
-        if isinstance(found, str):
-            rows.append(blank() | about | {"reason": found})
-            continue
-        known = {k: e for k, e in known.items() if _works(e, found)}
-        rows += [row | about for row in _ledger(found, known, tuple(sorted(set(model) & set(known))))]
+        mine = all_of_them[~_touched(all_of_them, acts or {})]
+        if len(mine) < len(all_of_them):
+            print(
+                f"{key.subject}: {len(all_of_them) - len(mine)} of {len(all_of_them)} loci left out, a contact beside the plates acts there"
+            )
+        settled = Known(
+            dict((corrected or {}).get(key.subject, {})), dict((plant or {}).get(key.subject, {})), every, len(mine) < len(all_of_them)
+        )
+        told: list[list[dict[str, Any]]] = []
+        for readings in _readings(settled):
+            found = staged(about, mine, signals, pushes, coverage, trust, clusters, controller, readings)
+            if isinstance(found, str):
+                told.append([blank() | about | {"reason": found}])
+                continue
+            known = {k: e for k, e in known.items() if _works(e, found)}
+            told.append([row | about for row in _ledger(found, known, tuple(sorted(set(model) & set(known))))])
+        best = min(told, key=lambda rows: _accused(rows, every)) if len(told) > 1 else told[0]
+        rows += best
     return pd.DataFrame(rows, columns=[c.name for c in TABLES["control"]])
+
+
+def _touched(loci: pd.DataFrame, acts: Mapping[str, Sequence[tuple[int, int]]]) -> NDArray[np.bool_]:
+    """Loci (m,) in which a contact acts: nobody measured frame by frame what it did to the CoM."""
+    rows = zip(loci["trial"], loci["start_frame"], loci["end_frame"], strict=True)
+    return np.array([any(a <= end and b >= start for a, b in acts.get(trial, ())) for trial, start, end in rows], bool)
+
+
+def _readings(settled: Known) -> Iterator[Known]:
+    """What the plant ledger has found, and the same with a fault of a record read as one that no motion tells from it."""
+    yield settled
+    for twin in settled.effects.values():
+        sizes = settled.faults.get(twin.twin)
+        if sizes and twin.undo is not None and not twin.parameters[0].refusal(sizes[0]):
+            others = {k: v for k, v in settled.faults.items() if k != twin.twin}
+            yield settled._replace(faults={**others, twin.id: sizes})
+
+
+def _accused(rows: Sequence[Mapping[str, Any]], effects: Mapping[str, Effect]) -> tuple[float, float]:
+    """Faults of the law that rows of `control` name, then log likelihood that it gains by any: of two readings the lesser is taken.
+
+    Where both name one it does not matter by how much.
+    """
+    block = judge(pd.DataFrame(rows, columns=[c.name for c in TABLES["control"]]), effects=effects)
+    if block["missing"] is None:
+        return np.inf, np.inf
+    if number := len(block["missing"]) + block["unexplained"]:
+        return number, 0.0
+    score: Counter[str] = Counter()
+    for row in rows:
+        if row["mode"] == "loop":
+            score[row["candidate"]] += row["score"]
+    return 0.0, (score[""] - min(score.values())) / 2
 
 
 def _works(effect: Effect, stage: Stage) -> bool:

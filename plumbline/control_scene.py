@@ -82,13 +82,13 @@ def staged(
         (group, _), (_, driven) = groups(omega)
         if group is None or group.steady.sum() < FEWEST_LOCI:
             return "too few loci have an unbroken CoM and ZMP"
-        omega = _omega(driven, group, omega) if known.faults or known.plant else omega
+        omega = _omega(driven, group, omega) if known.anew else omega
         shift = _constant(group.batch, omega)
     (group, frames), (moved, _) = groups(omega, shift)
     if group is None or moved is None:
         return "too few loci have an unbroken CoM and ZMP"
     group = replace(group, batch=replace(moved.batch, p=group.batch.p)) if known.plant else group
-    stage = _with_base(group, frames, trust if not known.faults else None, row, omega)
+    stage = _with_base(group, frames, trust if not (known.faults or known.fewer) else None, row, omega)
     return stage if isinstance(stage, str) else stage._replace(shift=_shift(known))
 
 
@@ -132,11 +132,20 @@ def _constant(batch: Batch, omega: float) -> float:
 
 
 class Known(NamedTuple):
-    """What the plant ledger has found: faults of instruments, and what drives the CoM beside the ZMP."""
+    """What the plant ledger has found: faults of instruments, and what drives the CoM beside the ZMP.
+
+    fewer: whether loci in which a contact acts were left out; the tables of the law before were made with them.
+    """
 
     faults: Sizes
     plant: Sizes
     effects: Mapping[str, Effect]
+    fewer: bool = False
+
+    @property
+    def anew(self) -> bool:
+        """Whether omega and regimes of the signals as recorded do not hold."""
+        return bool(self.faults or self.plant or self.fewer)
 
 
 def _law_row(rows: pd.DataFrame) -> "pd.Series[Any] | str":

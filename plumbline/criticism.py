@@ -3,7 +3,7 @@
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 TRIALS = 2
 PIECES = 6
 ROUNDS = 4  # times that what is settled is taken out of the channels and found again
-NEAR = 0.02  # [1] to which the lever per acceleration is found
+NEAR = 0.005  # [1] to which the lever per acceleration is found
 ALIKE = 1e-3  # [1] to which the body mass is
 BODIES = (0.8, 1.5)  # [1] lever per acceleration in parts of z/g: rigid bodies and people who counter-rotate
 WORTH = 0.3  # [1] of the size that matters, from which on a settled effect is taken out
@@ -226,15 +226,26 @@ class OneByOne(Sequence[list[Weak]]):
 Sizes = dict[str, dict[str, list[float]]]
 
 
-def known(judged: pd.DataFrame, tried: pd.DataFrame, effects: Mapping[str, Effect]) -> tuple[Sizes, Sizes]:
-    """What was found in each subject's lateral motion, as the control ledger takes it out: faults of records, what the body does besides.
+class Settled(NamedTuple):
+    """What was found in each subject's lateral motion, as the control ledger takes it out.
 
-    judged, tried: tables `judged`, `candidates`.  Returns subject -> effect -> parameters where it can undo itself, else coefficients.
+    faults: of records, subject -> effect -> parameters where it can undo itself, else coefficients.  others: the same of what the body
+    does besides.  acts: trial -> first and last frame of each time that a contact beside the plates acts.
     """
+
+    faults: Sizes
+    others: Sizes
+    acts: dict[str, Sequence[tuple[int, int]]]
+
+
+def known(judged: pd.DataFrame, tried: pd.DataFrame, effects: Mapping[str, Effect]) -> Settled:
+    """What the tables `judged` and `candidates` say that the control ledger needs."""
     faults: Sizes = {}
     others: Sizes = {}
+    acts: dict[str, Sequence[tuple[int, int]]] = {}
     for _, about in judged[(judged["axis"] == "lateral") & (judged["reason"] == "")].iterrows():
         theta = json.loads(about["theta"])
+        acts |= json.loads(about["acts"])
         rows = tried[(tried["axis"] == "lateral") & (tried["subject"] == about["subject"]) & (tried["status"] == "found")]
         for _, row in rows.iterrows():
             name, values = str(row["effect"]), {k: v["value"] for k, v in json.loads(row["parameters"]).items()}
@@ -245,4 +256,4 @@ def known(judged: pd.DataFrame, tried: pd.DataFrame, effects: Mapping[str, Effec
             direct = effects[name].undo is not None or name not in theta
             sizes = [*values.values()] if direct else theta[name]
             (faults if effects[name].recorded else others).setdefault(about["subject"], {})[name] = sizes
-    return faults, others
+    return Settled(faults, others, acts)

@@ -32,7 +32,7 @@ def judged(axis: str, subject: str, finding: Finding, sizes: tuple[int, int], w2
         "floor": finding.floor, "w2": w2, "h": h, "over": json.dumps(finding.over), "left": ", ".join(finding.left),
         "shapes": ", ".join(finding.shapes), "refused": json.dumps([[r.effects, _plain(r.error), r.reason] for r in finding.refused]),
         "follows": told.follows if told else "", "formulas": json.dumps(told.formulas if told else []), "theta": json.dumps(theta),
-        "reason": "",
+        "acts": json.dumps(finding.acts[0] if len(finding.acts) == 1 else {}), "reason": "",
     }  # fmt: skip
 
 
@@ -46,7 +46,17 @@ class Told(NamedTuple):
 def unjudged(axis: str, subject: str, sizes: tuple[int, int], reason: str) -> Row:
     """Row of `judged` where nothing can be said."""
     numbers: Row = dict.fromkeys(("base", "final", "floor", "w2", "h"), float("nan"))
-    texts: Row = {"over": "{}", "left": "", "shapes": "", "refused": "[]", "follows": "", "formulas": "[]", "theta": "{}", "reason": reason}
+    texts: Row = {
+        "over": "{}",
+        "left": "",
+        "shapes": "",
+        "refused": "[]",
+        "follows": "",
+        "formulas": "[]",
+        "theta": "{}",
+        "acts": "{}",
+        "reason": reason,
+    }
     return {"axis": axis, "subject": subject, "trials": sizes[0], "pieces": sizes[1], **numbers, **texts}
 
 

@@ -11,6 +11,7 @@ from plumbline.contest import Refused
 Array = NDArray[np.float64]
 Set = tuple[str, ...]
 Interval = tuple[float, float, float]
+Spans = Mapping[str, Sequence[tuple[int, int]]]
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,7 @@ class Finding:
     floor: what sensor noise gives [m], NaN where not known.  over: equation -> residual over noise floor and usual faults.
     left: the equations in which more is left than noise and a model's usual faults explain; empty where the floor is not known.
     theta: of each subject, effect or base column -> coefficients of the last model.
+    acts: of each subject, trial -> first and last frame of each time that a contact beside the plates acts.
     """
 
     found: Sequence[Found] = ()
@@ -74,3 +76,4 @@ class Finding:
     over: Mapping[str, float] = field(default_factory=dict)
     left: tuple[str, ...] = ()
     theta: Sequence[Mapping[str, Array]] = ()
+    acts: Sequence[Spans] = ()

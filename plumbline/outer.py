@@ -26,11 +26,11 @@ Mask = NDArray[np.bool_]
 CONTACT = "push"  # id of the effect
 LOUD = 5.0  # [1] times noise and usual faults, from which on something acts
 LOAD = 0.02  # [1] of body weight, the same for what the plates do not carry
-LATERAL = 0.004  # [1] of body weight, the same for a force to the side
+LATERAL = 0.002  # [1] of body weight, the same for a force to the side
 REST = 0.35  # [1] share of windows in which nothing must act
 ACTS = 0.03  # [1] and in which something must
 ALWAYS = 0.9  # [1] of a trial
-SIDE = 0.9  # [1] of its square that must have one sign
+SIDE = 0.97  # [1] of its square that must have one sign
 EVEN = 0.02  # [1] by which a force to the side may vary while it acts, beside noise; what carries weight can be nothing else
 EVEN_NOISE = 1.5  # [1] times the noise, the same
 FULL = 0.2  # [1] of its usual size, from which on a load that the record cuts short is one: bodies bounce
@@ -262,7 +262,18 @@ def named(
     push = Found(CONTACT, (CONTACT,), parameters, error[0], error[1], p, p)
     tried = [*(c for c in finding.candidates if c.effect != CONTACT), Candidate(CONTACT, "found", error[1], p=p)]
     others = [replace(f, before=float(np.sqrt(max(error[1] ** 2 + f.before**2 - f.after**2, 0.0))), after=error[1]) for f in finding.found]
-    return replace(finding, found=[push, *others], candidates=sorted(tried, key=lambda c: c.effect), final=error[1])
+    acts = [spans(ws, contact) if contact else {} for ws, contact in zip(windows, contacts, strict=True)]
+    return replace(finding, found=[push, *others], candidates=sorted(tried, key=lambda c: c.effect), final=error[1], acts=acts)
+
+
+def spans(windows: Sequence[Weak], contact: Contact) -> dict[str, list[tuple[int, int]]]:
+    """Trial -> first and last frame of each time that a contact acts; its test functions lie within."""
+    out: dict[str, list[tuple[int, int]]] = {}
+    for w, loud in zip(windows, contact.loud, strict=True):
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], loud.view(np.int8), [0]])))
+        if len(edges):
+            out[w.trial] = [(int(w.frame[a]), int(w.frame[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    return out
 
 
 def _rest(w: Weak, equation: str, theta: Mapping[str, Array], w2: float, h: float) -> Array:

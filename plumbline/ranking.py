@@ -79,6 +79,8 @@ def _beside_contacts(windows: Sequence[Sequence[Weak]], effects: Mapping[str, Ef
     h = h or [LEANS / w for w in w2]
     mine = [w2[k] for k in able], [h[k] for k in able]
     finding = _judge(_Made(lambda i: still(able[i]), len(able)), effects, *mine)
+    if (finding.left or finding.shapes) and not any(c.vertical for c in contacts if c):
+        return _judge(windows, effects, w2, h)  # a force to the side beside something that nobody explains may be a part of that
     told = outer.named(finding, _Made(lambda i: windows[able[i]], len(able)), [contacts[k] for k in able], *mine)
     return told or _judge(windows, effects, w2, h)
 

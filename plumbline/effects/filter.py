@@ -2,8 +2,12 @@
 
 import numpy as np
 
+from plumbline.batch import slow
 from plumbline.effects._channels import Array, Channels
 from plumbline.effects._effect import Effect, Parameter
+
+RECORD = ("grf_x", "grf_y", "grf_z", "zmp_x", "zmp_y")
+BEND = 5.0  # [Hz] smoother of what is given back: two derivatives of noise would drown it
 
 
 def columns(c: Channels) -> Array:
@@ -14,6 +18,19 @@ def columns(c: Channels) -> Array:
 def force(c: Channels) -> Array:
     """F'/m [per s]."""
     return np.asarray((c.grf_x_dot / c.mass)[:, None])
+
+
+def undo(c: Channels, values: Array) -> Channels:
+    """The force record before a Butterworth filter of second order: 1/H = 1 + tau s + (tau s)^2 / 2, exact."""
+    tau = float(values[0])
+
+    def lost(name: str) -> Array:
+        y = tau * c[f"{name}_dot"] + tau**2 / 2 * c[f"{name}_ddot"]
+        known = np.isfinite(y)
+        y[known] = slow(y[known], c.rate, BEND)
+        return y
+
+    return c.changed(**{k: c[k] + lost(k) for k in RECORD if c.has(k)})
 
 
 EFFECT = Effect(
@@ -27,6 +44,7 @@ EFFECT = Effect(
     separated="the raw, unfiltered force record: white noise up to its highest frequency rules a filter out",
     columns=columns,
     force=force,
+    undo=undo,
     twin="sync",
     recorded=True,
 )

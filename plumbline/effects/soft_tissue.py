@@ -21,6 +21,11 @@ def values(theta: Array, constant: float) -> Array:
     return np.sqrt(1.0 / np.where(theta > 0, theta, np.nan)) / (2.0 * np.pi)
 
 
+def undo(c: Channels, values: Array) -> Channels:
+    """The CoM of the bones."""
+    return c.changed(com_x=c.com_x + c.grf_x / c.mass / (2.0 * np.pi * float(values[0])) ** 2)
+
+
 EFFECT = Effect(
     title="Soft tissue",
     ledger="plant",
@@ -33,5 +38,6 @@ EFFECT = Effect(
     columns=columns,
     force=force,
     values=values,
+    undo=undo,
     recorded=True,
 )
