@@ -20,6 +20,7 @@ from plumbline.control_rows import blank, of_fit
 from plumbline.control_scene import FEWEST_LOCI, Known, Sizes, Stage, staged
 from plumbline.control_shapes import offered
 from plumbline.control_verdict import judge
+from plumbline.criticism import Outside
 from plumbline.effects import HERE as LIBRARY
 from plumbline.effects import Effect, catalogue, where
 from plumbline.estimators import loop_error
@@ -54,7 +55,7 @@ def of_part(
     evaluation: Mapping[str, Any],
     corrected: Mapping[str, Sizes] | None = None,
     plant: Mapping[str, Sizes] | None = None,
-    acts: Mapping[str, Sequence[tuple[int, int]]] | None = None,
+    contacts: Mapping[str, Outside] | None = None,
     effects: Mapping[str, Effect] | None = None,
     model: Sequence[str] = (),
 ) -> pd.DataFrame:
@@ -62,7 +63,7 @@ def of_part(
 
     corrected: subject -> {"sync": [0.016], ...}, instrument effects to take out of the CoM and the ZMP first.  plant: the same for what
     moves the body beside the ZMP ("ang_mom", "hand", ...): the CoM and its velocity at push end are then known better.
-    acts: trial -> first and last frame of each time that a contact beside the plates acts; loci that it touches are left out.
+    contacts: subject -> contact beside the plates, which moves the body too.
     effects: the catalogue, default the library's.  model: effects of the configured model; those of the control ledger are fitted
     together in any case.
     """
@@ -71,16 +72,10 @@ def of_part(
     known = {k: e for k, e in every.items() if e.ledger == "control" and e.law}
     rows: list[dict[str, Any]] = []
     lateral = loci[loci["task"] == TASK]
-    for key, all_of_them in by_group(lateral):
+    for key, mine in by_group(lateral):
         about = key._asdict()
-        mine = all_of_them[~_touched(all_of_them, acts or {})]
-        if len(mine) < len(all_of_them):
-            print(
-                f"{key.subject}: {len(all_of_them) - len(mine)} of {len(all_of_them)} loci left out, a contact beside the plates acts there"
-            )
-        settled = Known(
-            dict((corrected or {}).get(key.subject, {})), dict((plant or {}).get(key.subject, {})), every, len(mine) < len(all_of_them)
-        )
+        faults, others = (dict((c or {}).get(key.subject, {})) for c in (corrected, plant))
+        settled = Known(faults, others, every, (contacts or {}).get(key.subject))
         told: list[list[dict[str, Any]]] = []
         for readings in _readings(settled):
             found = staged(about, mine, signals, pushes, coverage, trust, clusters, controller, readings)
@@ -92,12 +87,6 @@ def of_part(
         best = min(told, key=lambda rows: _accused(rows, every)) if len(told) > 1 else told[0]
         rows += best
     return pd.DataFrame(rows, columns=[c.name for c in TABLES["control"]])
-
-
-def _touched(loci: pd.DataFrame, acts: Mapping[str, Sequence[tuple[int, int]]]) -> NDArray[np.bool_]:
-    """Loci (m,) in which a contact acts: nobody measured frame by frame what it did to the CoM."""
-    rows = zip(loci["trial"], loci["start_frame"], loci["end_frame"], strict=True)
-    return np.array([any(a <= end and b >= start for a, b in acts.get(trial, ())) for trial, start, end in rows], bool)
 
 
 def _readings(settled: Known) -> Iterator[Known]:

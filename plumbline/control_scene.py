@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 
 from plumbline import law as laws
 from plumbline.batch import Batch, slow
+from plumbline.criticism import Outside
 from plumbline.effects import Effect
 from plumbline.effects._channels import Channels, Person, of_trial, persons
 from plumbline.estimators import saturation
 from plumbline.groups import Group, Key, of_loci, regimes
 from plumbline.models.loop import Scene
+from plumbline.physics import G
 from plumbline.plant import rows_of, sampling_rate
 from plumbline.weak import Bump
 
@@ -73,8 +75,9 @@ def staged(
     def groups(omega: float, shift: float = 0.0) -> Iterator[tuple[Group | None, pd.DataFrame]]:
         """Loci and signals with the faults taken out; the same as the ZMP alone would have to drive them."""
         frames = _applied(raw, coverage, person, known.effects, known.faults, omega, _taken_out)
-        for sizes in ({}, known.plant):
-            table = _applied(frames, coverage, person, known.effects, sizes, omega, _driven)
+        for moved in (False, True):
+            table = _applied(frames, coverage, person, known.effects, known.plant if moved else {}, omega, _driven)
+            table = _carried(table, coverage, known.contact) if moved and known.contact else table
             yield next(of_loci(table.assign(zmp_x=table["zmp_x"] + shift), pushes, mine, {key: omega}), None), table
 
     omega, shift = float(row["omega"]), 0.0
@@ -87,8 +90,8 @@ def staged(
     (group, frames), (moved, _) = groups(omega, shift)
     if group is None or moved is None:
         return "too few loci have an unbroken CoM and ZMP"
-    group = replace(group, batch=replace(moved.batch, p=group.batch.p)) if known.plant else group
-    stage = _with_base(group, frames, trust if not (known.faults or known.fewer) else None, row, omega)
+    group = replace(group, batch=replace(moved.batch, p=group.batch.p)) if known.moved else group
+    stage = _with_base(group, frames, trust if not (known.faults or known.contact) else None, row, omega)
     return stage if isinstance(stage, str) else stage._replace(shift=_shift(known))
 
 
@@ -134,18 +137,23 @@ def _constant(batch: Batch, omega: float) -> float:
 class Known(NamedTuple):
     """What the plant ledger has found: faults of instruments, and what drives the CoM beside the ZMP.
 
-    fewer: whether loci in which a contact acts were left out; the tables of the law before were made with them.
+    contact: beside the plates, None where there is none.
     """
 
     faults: Sizes
     plant: Sizes
     effects: Mapping[str, Effect]
-    fewer: bool = False
+    contact: Outside | None = None
+
+    @property
+    def moved(self) -> bool:
+        """Whether something drives the CoM beside the ZMP."""
+        return bool(self.plant or self.contact)
 
     @property
     def anew(self) -> bool:
         """Whether omega and regimes of the signals as recorded do not hold."""
-        return bool(self.faults or self.plant or self.fewer)
+        return bool(self.faults or self.moved)
 
 
 def _law_row(rows: pd.DataFrame) -> "pd.Series[Any] | str":
@@ -187,6 +195,23 @@ def _driven(c: Channels, effect: Effect, theta: Array) -> Channels:
     if effect.columns is None:
         return c
     return c.changed(zmp_x=c["zmp_x"] - slow(np.nan_to_num(effect.columns(c)) @ theta, c.rate, BEND) / c.w2)
+
+
+def _carried(frames: pd.DataFrame, coverage: pd.DataFrame, contact: Outside) -> pd.DataFrame:
+    """Signals of one subject with the ZMP that the plates would have shown had they carried a contact too, while it acts.
+
+    x - p = h x'' - (he/g) Fe/m + (xe - p) We/(m g), with Fe to the side at height he and We carried at xe.
+    """
+    weight = dict(zip(coverage["trial"], coverage["mass"] * G, strict=True))
+    line = {k: v if np.isfinite(v) else 0.0 for k, v in contact.line.items()}
+    zmp = frames["zmp_x"].to_numpy(float).copy()
+    for trial, rows in frames.groupby("trial", sort=False, observed=True).indices.items():
+        frame = frames["frame"].to_numpy()[rows]
+        for first, last in contact.acts.get(str(trial), ()):
+            at = rows[(frame >= first) & (frame <= last)]
+            carried = line.get("force", 0.0) * (line.get("x", 0.0) - zmp[at])
+            zmp[at] += (carried - line.get("lateral", 0.0) * line.get("height", 0.0)) / weight[trial]
+    return frames.assign(zmp_x=zmp)
 
 
 def _with_base(group: Group, frames: pd.DataFrame, trust: pd.DataFrame | None, row: "pd.Series[Any]", omega: float) -> Stage | str:

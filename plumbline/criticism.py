@@ -16,6 +16,7 @@ from plumbline.fit import BOTH, NEITHER, TEST, TRAIN
 from plumbline.formulas import formulas, remains
 from plumbline.found import Finding
 from plumbline.library import channels, library
+from plumbline.outer import CONTACT
 from plumbline.physics import G
 from plumbline.plant import AXES
 from plumbline.ranking import LEANS, judge
@@ -226,29 +227,37 @@ class OneByOne(Sequence[list[Weak]]):
 Sizes = dict[str, dict[str, list[float]]]
 
 
+class Outside(NamedTuple):
+    """A contact beside the plates.  line: of action, the parameters of `push`.  acts: trial -> first and last frame of each time."""
+
+    line: Mapping[str, float]
+    acts: Mapping[str, Sequence[tuple[int, int]]]
+
+
 class Settled(NamedTuple):
     """What was found in each subject's lateral motion, as the control ledger takes it out.
 
     faults: of records, subject -> effect -> parameters where it can undo itself, else coefficients.  others: the same of what the body
-    does besides.  acts: trial -> first and last frame of each time that a contact beside the plates acts.
+    does besides.  contacts: those beside the plates.
     """
 
     faults: Sizes
     others: Sizes
-    acts: dict[str, Sequence[tuple[int, int]]]
+    contacts: dict[str, Outside]
 
 
 def known(judged: pd.DataFrame, tried: pd.DataFrame, effects: Mapping[str, Effect]) -> Settled:
     """What the tables `judged` and `candidates` say that the control ledger needs."""
     faults: Sizes = {}
     others: Sizes = {}
-    acts: dict[str, Sequence[tuple[int, int]]] = {}
+    contacts: dict[str, Outside] = {}
     for _, about in judged[(judged["axis"] == "lateral") & (judged["reason"] == "")].iterrows():
         theta = json.loads(about["theta"])
-        acts |= json.loads(about["acts"])
         rows = tried[(tried["axis"] == "lateral") & (tried["subject"] == about["subject"]) & (tried["status"] == "found")]
         for _, row in rows.iterrows():
             name, values = str(row["effect"]), {k: v["value"] for k, v in json.loads(row["parameters"]).items()}
+            if name == CONTACT:
+                contacts[about["subject"]] = Outside(values, json.loads(about["acts"]))
             if "e0" in values:  # a shift of the CoM is one of the CoP, the other way
                 faults.setdefault(about["subject"], {})["offset"] = [-values["e0"]]
             if name not in effects or (name not in theta and name not in ("offset", "tilt")):
@@ -256,4 +265,4 @@ def known(judged: pd.DataFrame, tried: pd.DataFrame, effects: Mapping[str, Effec
             direct = effects[name].undo is not None or name not in theta
             sizes = [*values.values()] if direct else theta[name]
             (faults if effects[name].recorded else others).setdefault(about["subject"], {})[name] = sizes
-    return Settled(faults, others, acts)
+    return Settled(faults, others, contacts)

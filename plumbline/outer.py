@@ -151,8 +151,9 @@ def _uneven(windows: Sequence[Weak], residual: Sequence[Array], masks: Sequence[
     for w, r, loud in zip(windows, residual, masks, strict=True):
         edges = np.flatnonzero(np.diff(np.concatenate([[0], loud.view(np.int8), [0]])))
         for a, b in zip(edges[::2], edges[1::2], strict=True):
-            reach = min(w.bump.half_width, (w.time[b - 1] - w.time[a]) / 3)
-            core = r[a:b][(w.time[a:b] >= w.time[a] + reach) & (w.time[a:b] <= w.time[b - 1] - reach)]
+            time = w.time[a:b][_half(r[a:b])]
+            reach = min(w.bump.half_width, (time[-1] - time[0]) / 3)
+            core = r[a:b][(w.time[a:b] >= time[0] + reach) & (w.time[a:b] <= time[-1] - reach)]
             if len(core) > 1:
                 each.append(np.sqrt(np.mean((core - core.mean()) ** 2) / np.mean(core**2)))
     return float(np.median(each)) if each else 1.0
@@ -267,13 +268,21 @@ def named(
 
 
 def spans(windows: Sequence[Weak], contact: Contact) -> dict[str, list[tuple[int, int]]]:
-    """Trial -> first and last frame of each time that a contact acts; its test functions lie within."""
+    """Trial -> first and last frame of each time that a contact acts."""
     out: dict[str, list[tuple[int, int]]] = {}
-    for w, loud in zip(windows, contact.loud, strict=True):
+    forces = contact.pull if contact.lateral else contact.load
+    for w, loud, force in zip(windows, contact.loud, forces, strict=True):
         edges = np.flatnonzero(np.diff(np.concatenate([[0], loud.view(np.int8), [0]])))
-        if len(edges):
-            out[w.trial] = [(int(w.frame[a]), int(w.frame[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+        for a, b in zip(edges[::2], edges[1::2], strict=True):
+            frames = w.frame[a:b][_half(force[a:b])]
+            out.setdefault(w.trial, []).append((int(frames[0]), int(frames[-1])))
     return out
+
+
+def _half(force: Array) -> Mask:
+    """Where a force is more than half of what it is in full: a test function whose middle is where it begins sees half of it."""
+    size = np.abs(force)
+    return np.asarray(size > np.quantile(size, 0.9) / 2)
 
 
 def _rest(w: Weak, equation: str, theta: Mapping[str, Array], w2: float, h: float) -> Array:

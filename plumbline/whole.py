@@ -29,9 +29,9 @@ def criticised(
     made["evidence"], alone, tried = of_part(tables["signals"], tables["pushes"], coverage, effects, evaluation)
     of = dict(tuple(made["evidence"].groupby("subject")))
     made["judged"], made["candidates"] = of_cohort(of, alone, tried, effects)
-    faults, others, acts = known(alone, tried, effects)
+    faults, others, contacts = known(alone, tried, effects)
     stages: dict[str, Any] = {n: tables[n] for n in ("signals", "pushes", "loci", "coverage", "trust", "clusters", "controller")}
-    made["control"] = control.of_part(**stages, evaluation=evaluation, corrected=faults, plant=others, acts=acts, effects=effects)
+    made["control"] = control.of_part(**stages, evaluation=evaluation, corrected=faults, plant=others, contacts=contacts, effects=effects)
     made["rungs"], _ = rungs.of_part(
         tables["signals"], tables["pushes"], coverage, made["evidence"], made["judged"], made["candidates"], effects, listed, evaluation
     )

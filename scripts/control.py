@@ -13,8 +13,14 @@ stamp = job.start(snakemake)
 read = {n: tables.read(n, snakemake.input[n]) for n in ("signals", "pushes", "loci", "coverage", "trust", "clusters", "controller")}
 effects = catalogue(Path("."))
 judged, tried = (tables.read(n, snakemake.input[n]) for n in ("judged", "candidates"))
-faults, forces, acts = known(judged, tried, effects)
+faults, forces, contacts = known(judged, tried, effects)
 made = control.of_part(
-    **read, evaluation=snakemake.params.config, corrected=faults, plant=forces, acts=acts, effects=effects, model=snakemake.params.model
+    **read,
+    evaluation=snakemake.params.config,
+    corrected=faults,
+    plant=forces,
+    contacts=contacts,
+    effects=effects,
+    model=snakemake.params.model,
 )
 tables.write("control", made, snakemake.output.control, stamp)

@@ -70,8 +70,8 @@ def test_undo_takes_out_what_the_columns_describe(name: str) -> None:
     effect = PLANT[name]
     c = channels()
     c = Channels(c.values, c.rate, c.mass, c.height, 9.0)
-    amount = np.array([1e-4, 0.0])[: len(effect.parameters)]
-    clean = effect.undo(c, amount)  # type: ignore[misc]
+    amount = np.array([1e-4])
+    clean = effect.undo(c, effect.of_coefficients(amount))  # type: ignore[misc]
     assert effect.columns is not None
     assert effect.force is not None or name == "gain"
 
