@@ -145,13 +145,16 @@ def _uneven(windows: Sequence[Weak], residual: Sequence[Array], masks: Sequence[
     """Scatter of a contact around its mean, in parts of it, away from its beginning and end: the median over the times that it acts.
 
     Where the body is and how it moves tells little: someone who is pushed stands elsewhere for as long. But a spring, a wall or a magnet
-    pulls more or less as the body moves, and a contact hardly does. A time that the record cuts short is all beginning: it tells nothing.
+    pulls more or less as the body moves, and a contact hardly does. A time that is short, or that the record cuts short, is all beginning:
+    it tells nothing.
     """
     each = []
     for w, r, loud in zip(windows, residual, masks, strict=True):
         edges = np.flatnonzero(np.diff(np.concatenate([[0], loud.view(np.int8), [0]])))
         for a, b in zip(edges[::2], edges[1::2], strict=True):
             time = w.time[a:b][_half(r[a:b])]
+            if time[-1] - time[0] < LONG:
+                continue
             reach = min(w.bump.half_width, (time[-1] - time[0]) / 3)
             core = r[a:b][(w.time[a:b] >= time[0] + reach) & (w.time[a:b] <= time[-1] - reach)]
             if len(core) > 1:
