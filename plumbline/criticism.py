@@ -53,7 +53,7 @@ def of_part(
                 continue
             told = look(got, finding, signals, mine, effects) if finding.left or finding.shapes else None
             rows.append(findings.judged(axis, subject, finding, sizes([got]), gravity(got), lever(finding, got), told))
-            tried += findings.candidates(axis, subject, finding, plant)
+            tried += findings.scaled(findings.candidates(axis, subject, finding, plant), outer.scale(got))
     return evidence.to_table(windows), _table("judged", rows), _table("candidates", tried)
 
 

@@ -9,7 +9,8 @@ import pandas as pd
 
 from plumbline.effects import Effect
 from plumbline.effects_text import separated
-from plumbline.found import Candidate, Finding, Found
+from plumbline.found import Candidate, Finding, Found, Interval
+from plumbline.outer import Scale
 from plumbline.shapes import SHAPES
 
 Row = dict[str, Any]
@@ -69,16 +70,34 @@ def candidates(axis: str, subject: str, finding: Finding, effects: Mapping[str, 
         yield about | _found(one, by_name.get(one.effect, Candidate(one.effect, "found", q=one.q)), effects)
     for candidate in finding.candidates:
         if candidate.effect not in {f.effect for f in found}:
-            yield about | _tried(candidate)
+            yield about | _tried(candidate) | {"parameters": _sizes(candidate.effect, candidate.parameters, effects)}
+
+
+def scaled(rows: Iterator[Row], scale: Scale | None) -> Iterator[Row]:
+    """Rows of `candidates`, that of the force scale with what the vertical force says of it.
+
+    It is put right before anything else: each trial has the body mass that its own plates tell.
+    """
+    for row in rows:
+        if scale is not None and row["effect"] == "force_scale" and row["status"] != "found":
+            each = ", ".join(f"{trial} ({100 * v:+.1f} %)" for trial, v in scale.trials.items())
+            said = f"the plates carry {'more' if scale.s[0] > 0 else 'less'} than most of the time, taken out of {each}"
+            size = {"s": {"value": scale.s[0], "unit": "1", "ci95": list(scale.s[1:])}}
+            row |= {"status": "settled", "parameters": json.dumps(size), "reason": said}
+        yield row
 
 
 def _found(one: Found, candidate: Candidate, effects: Mapping[str, Effect]) -> Row:
-    units = {p.name: p.unit for p in effects[one.effect].parameters} if one.effect else {}
-    parameters = {k: {"value": v[0], "unit": units.get(k, ""), "ci95": [_plain(v[1]), _plain(v[2])]} for k, v in one.parameters.items()}
     return _tried(candidate) | {
         "status": "found", "family": ", ".join(one.family), "before": one.before, "after": one.after, "q": one.q,
-        "parameters": json.dumps(parameters),
+        "parameters": _sizes(one.effect, one.parameters, effects),
     }  # fmt: skip
+
+
+def _sizes(effect: str, parameters: Mapping[str, Interval], effects: Mapping[str, Effect]) -> str:
+    """Parameters as JSON: name -> value, unit, ci95."""
+    units = {p.name: p.unit for p in effects[effect].parameters} if effect else {}
+    return json.dumps({k: {"value": v[0], "unit": units.get(k, ""), "ci95": [_plain(v[1]), _plain(v[2])]} for k, v in parameters.items()})
 
 
 def _tried(c: Candidate) -> Row:

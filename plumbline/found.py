@@ -38,7 +38,7 @@ class Candidate:
     status: found, settled (fitted always, too small for a name), idle (brings nothing), refused, absorbed, alike (of a family that is
     named) or lacking.  error: held-out error with it beside the final model [m].  low, high: 95 % interval of the fall that it brings [m].
     p: of no such effect.  q: the same, false discovery rate over the catalogue.  vif: variance inflation beside the final model.
-    trials: that would find such an effect with 80 % power.  reason: in words.
+    trials: that would find such an effect with 80 % power.  reason: in words.  parameters: as in `Found`, of what is settled.
     """
 
     effect: str
@@ -51,6 +51,7 @@ class Candidate:
     vif: float = float("nan")
     trials: float = float("nan")
     reason: str = ""
+    parameters: Mapping[str, Interval] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import stdtrit
 from scipy.stats import ttest_1samp
 
 from plumbline.evidence import Weak, split
@@ -89,11 +90,54 @@ def find(windows: Sequence[Weak], faults: float) -> Contact | None:
 
 
 def masses(windows: Sequence[Weak]) -> dict[str, float]:
-    """Body mass in each trial [kg], as its windows tell it by the vertical force; of all trials where a contact carries some in any."""
-    each = {w.trial: w.mass * (1 - w.vertical / G) for w in windows if np.isfinite(w.vertical).all()}
-    if any(np.mean(np.abs(m / np.median(m) - 1) > LOAD / 2) > ACTS for m in each.values()):
-        return dict.fromkeys(each, float(np.median(np.concatenate(list(each.values())))))
-    return {k: float(np.median(m)) for k, m in each.items()}
+    """Body mass in each trial [kg], as its windows tell it by the vertical force; of all trials where a contact carries some."""
+    each = _masses(windows)
+    usual = _usual(each)
+    return {k: float(np.median(m)) if _steady(m) else usual for k, m in each.items()}
+
+
+class Scale(NamedTuple):
+    """Plates that carry more, or less, in some trials than most of the time.  s: share with its 95 % interval.  trials: share in each."""
+
+    s: Interval
+    trials: Mapping[str, float]
+
+
+def scale(windows: Sequence[Weak]) -> Scale | None:
+    """The scale of the plates in the trials where it matters; None where it matters in none.
+
+    One who weighs more in one trial than in the next has put something on, or stands on plates that read too much.
+    """
+    each = _masses(windows)
+    usual = _usual(each)
+    shares = {k: m / usual - 1 for k, m in each.items() if _steady(m)}
+    odd = {k: v for k, v in shares.items() if abs(np.median(v)) > LOAD / 2}
+    if not odd:
+        return None
+    side = np.sign(max((float(np.median(v)) for v in odd.values()), key=abs))
+    odd = {k: v for k, v in odd.items() if side * np.median(v) > 0}
+    every = np.concatenate(list(odd.values()))
+    # test functions that overlap by more than half tell the same
+    number = max(2.0, sum(float(np.ptp(w.time)) / w.bump.half_width for w in windows if w.trial in odd))
+    half = float(stdtrit(number - 1, 0.975) * np.std(every) / np.sqrt(number))
+    mean = float(every.mean())
+    if abs(mean) - half < LOAD / 2:
+        return None
+    return Scale((mean, mean - half, mean + half), {k: float(v.mean()) for k, v in odd.items()})
+
+
+def _masses(windows: Sequence[Weak]) -> dict[str, Array]:
+    """Body mass that each window tells by the vertical force [kg], by trial; only those with the vertical recorded."""
+    return {w.trial: w.mass * (1 - w.vertical / G) for w in windows if np.isfinite(w.vertical).all() and len(w.vertical)}
+
+
+def _usual(masses: Mapping[str, Array]) -> float:
+    return float(np.median(np.concatenate(list(masses.values())))) if masses else float("nan")
+
+
+def _steady(mass: Array) -> bool:
+    """Whether nothing else carries some of the person for a while."""
+    return bool(np.mean(np.abs(mass / np.median(mass) - 1) > LOAD) <= ACTS)
 
 
 def _centred(values: Sequence[Array]) -> list[Array]:

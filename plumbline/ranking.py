@@ -194,6 +194,7 @@ def _finding(
     fits = [case.fit(s, members) for s in case.sums]
     theta = [{n: f.of(s, n)[0] for n in dict.fromkeys(s.columns[c][0] for c in f.columns)} for s, f in zip(case.sums, fits, strict=True)]
     tried = candidates(case, members, found, needs, refused, absorbed, lacking)
+    tried = [replace(c, parameters=_parameters(case, members, c.effect)) if c.status == "settled" else c for c in tried]
     return Finding(found, shapes, refused, tried, lacking, base, final, float(case.floor[whole]), over, left, theta)
 
 
@@ -217,13 +218,18 @@ def _matters(case: Case, members: Set, name: str, needed: Need) -> bool:
 
 
 def _found(case: Case, members: Set, name: str, needed: Need, final: float) -> Found:
-    values = case.middle(members, name)
-    half = _reach(case, members, name)
     v1, v0 = (np.sqrt(v[-1]) for v in case.variance(case.with_and_without(members, name)))
-    names = [p.name for p in case.effects[name].parameters]
-    parameters = {k: (float(v), float(v - h), float(v + h)) for k, v, h in zip(names, values, half, strict=False)}
     before = float(np.sqrt(max(final**2 + v0**2 - v1**2, 0.0)))
-    return Found(name, tuple([name, *_alike(case, members, name, needed)]), parameters, before, final, needed.p, needed.p)
+    return Found(
+        name, tuple([name, *_alike(case, members, name, needed)]), _parameters(case, members, name), before, final, needed.p, needed.p
+    )
+
+
+def _parameters(case: Case, members: Set, name: str) -> dict[str, Interval]:
+    """Value and 95 % interval of each parameter."""
+    names = [p.name for p in case.effects[name].parameters]
+    values, half = case.middle(members, name), _reach(case, members, name)
+    return {k: (float(v), float(v - h), float(v + h)) for k, v, h in zip(names, values, half, strict=False)}
 
 
 def _reach(case: Case, members: Set, name: str) -> Array:

@@ -224,6 +224,32 @@ def test_a_load_that_somebody_carries_does_not_pass_for_body_mass(tmp_path: Path
     assert outer.masses(windows)[windows[0].trial] == pytest.approx(windows[0].mass, rel=1e-3)
 
 
+def test_plates_that_read_more_in_one_trial_are_told(tmp_path: Path) -> None:
+    """Forces 5 % too large in one of six trials: that trial is named with its share; the same in all passes for body mass."""
+    got = made(tmp_path, {})
+    first = got.signals["trial"].iloc[0]
+    odd = got.signals["trial"] == first
+    forces = [f"grf_{k}" for k in "xyz"]
+    signals = got.signals.copy()
+    signals.loc[odd, forces] *= 1.05
+    windows, finding = settled(signals, got.pushes, got.coverage, EFFECTS, EVALUATION, "lateral")
+    told = outer.scale(windows)
+    assert finding is not None
+    assert finding.found == []
+    assert told is not None
+    assert list(told.trials) == [first]
+    assert told.s[1] < 0.05 < told.s[2]
+    assert told.s[2] - told.s[1] < 0.01
+    assert outer.scale(settled(got.signals, got.pushes, got.coverage, EFFECTS, EVALUATION, "lateral")[0]) is None
+
+
+def test_a_lever_is_found_as_well_as_a_strong_spring_needs(tmp_path: Path) -> None:
+    """300 N/m at 1.2 m: 2 % of the lever are 0.2 mm of ZMP, which would pass for something that no effect explains."""
+    got = found(made(tmp_path, {"hand": {"k": 300.0, "x": 0.02, "height": 1.2}}))
+    assert names(got) == {"hand"}
+    assert got.left == got.shapes == ()
+
+
 def test_a_contact_cut_short_by_the_end_of_the_record_counts_where_it_is_seen_elsewhere() -> None:
     """A run too short to be told alone is dropped inside a record, and kept beside a gap or an end if it acts in full there."""
     time = np.concatenate([np.arange(0, 2, 0.05), np.arange(4, 6, 0.05)])

@@ -70,6 +70,11 @@ def person(data: Path, tmp_path_factory: pytest.TempPathFactory) -> Criticised:
 
 
 @pytest.fixture(scope="module")
+def walker(data: Path, tmp_path_factory: pytest.TempPathFactory) -> Criticised:
+    return Criticised(tmp_path_factory.mktemp("walker"), data, {**TASKS, "walking1": "walk", "walkingTS1": "walk"})
+
+
+@pytest.fixture(scope="module")
 def hips(person: Criticised) -> pd.DataFrame:
     """Middle of the hip joint centres while sitting down and up again: time [s], x, y [m]."""
     got = next(r for r in person.recordings if r.trial.task == "sts")
@@ -118,3 +123,18 @@ def test_names_of_tasks_do_not_matter(person: Criticised, data: Path, tmp_path: 
         assert {k: [v["value"], *v["ci95"]] for k, v in b.items()} == {
             k: pytest.approx([v["value"], *v["ci95"]], rel=1e-6) for k, v in a.items()
         }
+
+
+def test_small_faults_of_the_record_are_told_with_their_intervals(walker: Criticised) -> None:
+    """The force record 7 +- 2 ms late and the plates of the walks 5.7 +- 0.5 % too large: sizes and intervals stand in the candidates."""
+    for axis in ("lateral", "forward"):
+        rows = walker.tried[walker.tried["axis"] == axis].set_index("effect")
+        for name, parameter, size, within in (("sync", "delay", 7e-3, 2e-3), ("force_scale", "s", 0.057, 0.005)):
+            assert rows.loc[name, "status"] == "settled"
+            told = json.loads(rows.loc[name, "parameters"])[parameter]
+            assert told["value"] == pytest.approx(size, abs=within)
+            low, high = told["ci95"]
+            assert 0 < low < size < high
+    said = walker.tried.loc[walker.tried["effect"] == "force_scale", "reason"].iloc[0]
+    assert "walk_run-04" in said
+    assert "static" not in said

@@ -7,7 +7,7 @@ from plumbline.effects._channels import Array, Channels
 from plumbline.effects._effect import Effect, Parameter
 
 RECORD = ("grf_x", "grf_y", "grf_z", "zmp_x", "zmp_y")
-BEND = 5.0  # [Hz] smoother of what is given back: two derivatives of noise would drown it
+BEND = 10.0  # [Hz] smoother of what is given back: two derivatives of noise would drown it, and limits are sharp
 
 
 def columns(c: Channels) -> Array:

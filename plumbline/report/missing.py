@@ -122,7 +122,7 @@ def _left(description: str) -> str:
 
 def _item(entry: Block, missing: Sequence[Block], effects: Effects, auto: bool) -> Item:
     effect = entry["effect"]
-    lines = [_fall(entry, len(missing) > 1), *(_value(k, v, effects.get(effect or "")) for k, v in entry["parameters"].items())]
+    lines = [_fall(entry, len(missing) > 1), *(value(k, v, effects.get(effect or "")) for k, v in entry["parameters"].items())]
     others = [k for k in entry["family"] if k != effect]
     if not effect:
         lines.append("These data cannot tell which of them it is.")
@@ -159,11 +159,11 @@ def rate(q: float) -> str:
 
 def sizes(entry: Block) -> str:
     """Parameters of an entry with their intervals and the error with it, in a row."""
-    said = [_value(k, v, None).rstrip(".") for k, v in entry["parameters"].items()]
+    said = [value(k, v, None).rstrip(".") for k, v in entry["parameters"].items()]
     return ", ".join([*said, f"error with it {number(entry['error_after_mm'])} mm"])
 
 
-def _value(name: str, said: Block, effect: Effect | None) -> str:
+def value(name: str, said: Block, effect: Effect | None) -> str:
     """Size of a parameter, its interval, and what physics says."""
     shown, factor, unit = scaled(said["value"], said["unit"])
     out = f"{name} = {shown}{unit}"

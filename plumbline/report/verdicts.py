@@ -1,5 +1,6 @@
 """Tables on what is missing: every candidate of the catalogue, and the verdict of each subject."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -8,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from plumbline.effects import Effect
-from plumbline.report.missing import rate
+from plumbline.report.missing import rate, value
 from plumbline.report.sheets import STATUS, Sheet, Show, decimals, joined, sheet, status, text, whole
 from plumbline.report.words import number, plural
 
@@ -36,6 +37,7 @@ def candidates(table: pd.DataFrame | None, effects: Mapping[str, Effect]) -> She
     shown = pooled.assign(
         name=[_named(row, effects) for _, row in pooled.iterrows()],
         order=pooled["status"].map(order), sideways=pooled["axis"] != "lateral",
+        reason=[_sized(row) for _, row in pooled.iterrows()],
         fall=[_between(a, b) for a, b in zip(pooled["fall_low"], pooled["fall_high"], strict=True)],
     ).sort_values(["sideways", "order", "effect"], kind="stable")  # fmt: skip
     columns: dict[str, tuple[str, Show]] = {
@@ -47,6 +49,12 @@ def candidates(table: pd.DataFrame | None, effects: Mapping[str, Effect]) -> She
     each = table["subject"].nunique() - 1
     more = f"Those of {plural(each, 'single subject')} are in results/candidates." if each > 1 else ""
     return replace(made, note=f"{made.note} {more}".strip())
+
+
+def _sized(row: pd.Series) -> str:
+    """Why, and of what is not named the size that was fitted."""
+    sizes = [value(k, v, None).rstrip(".") for k, v in json.loads(row["parameters"]).items()] if row["status"] == "settled" else []
+    return "; ".join([*sizes, *([row["reason"]] if row["reason"] else [])])
 
 
 def laws(table: pd.DataFrame | None, effects: Mapping[str, Effect]) -> Sheet:
