@@ -31,6 +31,8 @@ WHOLE = 1.5  # [1] the same of the whole equation, where both halves are well ex
 MANY = 2  # causes of one study, above which they are doubted
 PLAIN = 2.0  # [1] fall of the score that an effect must bring to be named where something is left that nobody explains
 DROWNED = 4.0  # [1] residual over noise floor and usual faults, above which any name may be its shadow
+WORSE = 1.05  # [1] of the error of the paper's equation, above which nothing is named: a fault of a scale may leave it as it is
+SHADOW = 0.2  # [1] fall of the score by a shape, beside which a fault that is always fitted vanishes: it was the shape's shadow
 LEANS = 1.1  # [1] h times w2 of a person who stands with an upright trunk, to begin with
 LOWER = 0.9  # [1] of the error without it, which a constant must reach
 SHOWS = 0.6  # [1] of what noise and usual faults leave, by which an effect of any motion must lower the rms to be named
@@ -134,6 +136,17 @@ def _plain(case: Case, members: Set) -> Set:
     return tuple(n for n in members if n not in faint)
 
 
+def _behind(case: Case, members: Set, name: str) -> str:
+    """The shape beside which an effect that is always fitted vanishes, and which predicts far better: the effect was its shadow."""
+    for shape in case.rivals:
+        if shape in SHAPES and shape not in BESIDE and shape not in members and shape not in case.twins[name]:
+            with_it = (*members, shape)
+            size = abs(float(case.middle(with_it, name)[0]))
+            if size < case.effects[name].parameters[0].matters and need(case, with_it, shape).fall > SHADOW:
+                return shape
+    return ""
+
+
 def _lowered(case: Case, names: Set, columns: set[str]) -> bool:
     """Whether the error on trials left out is lower with some constants than with none."""
     every = {"=moment", "=kinematic"}
@@ -175,6 +188,10 @@ def _finding(
     # many causes at once can put on the look of one that no list has: they must hold together all the better
     over, left = _over(case, members), _left(case, members, LEFT if len(named) > MANY else WHOLE)
     shapes = tuple(n for n in members if n in SHAPES and n not in BESIDE)
+    behind = {n: _behind(case, members, n) for n in named if n in case.settled}
+    shapes = tuple(dict.fromkeys((*shapes, *filter(None, behind.values()))))
+    refused = [*refused, *(Refused((n,), float("nan"), f"vanishes beside {SHAPES[k].title}") for n, k in behind.items() if k)]
+    named = [n for n in named if not behind.get(n)]
     if left or shapes:  # what nobody explains may look like any effect a little
         most = max(o * u for o, u, w in zip(over.values(), case.usual * case.as_zmp, case.weight, strict=True) if w > 0)
         drowned = max(over[e] for e, z in zip(over, case.weight * case.as_zmp, strict=True) if z > 0) > DROWNED
@@ -188,6 +205,9 @@ def _finding(
     silent = tuple({"=moment", "=kinematic"} - {c for one in kept for c in one.columns})
     final = case.left_out((*members, *named), () if case.placed(members) else silent)
     base = case.left_out((), ("=moment", "=kinematic"))
+    if named and final > WORSE * base:
+        refused = [*refused, *(Refused((n,), final, "the error on trials left out grows with it") for n in named)]
+        named, final = [], base
     found = [_found(case, members, n, needs[n], final) for n in named]
     for one in kept:
         found = _with_constant(found, one.effect, one.family, one.parameters, final, one.size, one.p)
