@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from plumbline import evidence, outer
 from plumbline.contest import decisive, own, tolerance
+from plumbline.criticism import in_use
 from plumbline.effects import Catalogue, Channels
 from plumbline.effects._channels import of_trial, persons
 from plumbline.evidence import Weak
@@ -64,7 +65,9 @@ def of_part(
             continue
         chosen = models(config, tried, str(axis))
         near = _near(tried[(tried["axis"] == axis) & (tried["subject"] == "all")])
-        bench = _Bench(list(evidence.from_table(rows)), effects, {*near, *(e for _, es in chosen for e in es)}, about.iloc[0], evaluation)
+        bench = _Bench(
+            in_use(list(evidence.from_table(rows))), effects, {*near, *(e for _, es in chosen for e in es)}, about.iloc[0], evaluation
+        )
         plants = _plants(signals, pushes, coverage[coverage["subject"] == subject], str(axis), evaluation)
         called = {str(r["trial"]): names(r["trial"], r["task"], str(r["files"]).split(" + ")) for _, r in coverage.iterrows()}
         trials = [Trial(w.trial, frozenset(called[w.trial])) for w in bench.windows]
