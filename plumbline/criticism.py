@@ -87,8 +87,8 @@ def of_cohort(
 
 
 def plant_effects(effects: Mapping[str, Effect]) -> dict[str, Effect]:
-    """Those of the plant ledger."""
-    return {k: e for k, e in effects.items() if e.ledger == "plant"}
+    """Those of the plant ledger that are looked for."""
+    return {k: e for k, e in effects.items() if e.ledger == "plant" and e.searched}
 
 
 def _table(name: str, rows: Sequence[findings.Row]) -> pd.DataFrame:

@@ -99,6 +99,8 @@ def _alike(effect: Effect) -> list[str]:
 def _notes(effect: Effect) -> Iterator[str]:
     if effect.twin:
         yield f"no recording of motion alone can tell it from {_alike(effect)[0]}: never searched for, only named beside it"
+    if not effect.searched:
+        yield "it would explain any fault of the markers: never searched for, judged where `models:` has it"
     if effect.settled:
         yield "always fitted and taken out before anything else is judged"
 

@@ -122,7 +122,7 @@ def split(values: Array, windows: Sequence[Weak]) -> list[Array]:
     return np.split(values, np.cumsum([len(w.time) for w in windows])[:-1])
 
 
-MARKERS = ("sync", "com_bias", "soft_tissue", "offset", "tilt", "gain", "force_scale")
+MARKERS = ("sync", "com_bias", "soft_tissue", "offset", "tilt", "gain", "force_scale", "shear")
 """Effects that set the force record against the markers."""
 
 

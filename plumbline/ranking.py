@@ -109,7 +109,7 @@ def _judge(windows: Sequence[Sequence[Weak]], effects: Mapping[str, Effect], w2:
     feet, places = [], []
     for ws in windows:
         every = {k: e for k, e in every.items() if all(k in w.terms for w in ws)}
-        lacking |= {k: v for w in ws for k, v in w.lacking.items() if k not in SHAPES}
+        lacking |= {k: v for w in ws for k, v in w.lacking.items() if k in effects}
         feet.append([w.feet for w in ws])
         places.append(abs(float(np.mean([w.zmp.mean() for w in ws]))))
     offered = [k for k in every if k not in CONSTANTS and k != CONTACT]

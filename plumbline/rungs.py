@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from plumbline import evidence, outer
 from plumbline.contest import decisive, own, tolerance
-from plumbline.criticism import in_use
+from plumbline.criticism import TRIALS, gravity, in_use
 from plumbline.effects import Catalogue, Channels
 from plumbline.effects._channels import of_trial, persons
 from plumbline.evidence import Weak
@@ -60,14 +60,16 @@ def of_part(
     rungs: list[dict[str, Any]] = []
     shown: list[pd.DataFrame] = []
     for (subject, axis), rows in table.groupby(["subject", "axis"], sort=True, observed=True):
-        about = judged[(judged["subject"] == subject) & (judged["axis"] == axis) & (judged["reason"] == "")]
-        if about.empty:
+        mine = judged[(judged["subject"] == subject) & (judged["axis"] == axis)]
+        windows = in_use(list(evidence.from_table(rows)))
+        # where nothing could be looked for, the user's own models are judged all the same
+        if mine.empty or len(windows) < TRIALS or (mine["reason"].iloc[0] and not config):
             continue
+        w2, h = (float(mine[k].iloc[0]) for k in ("w2", "h"))
+        level = (w2, h) if not mine["reason"].iloc[0] else (gravity(windows), 1.0 / gravity(windows))
         chosen = models(config, tried, str(axis))
         near = _near(tried[(tried["axis"] == axis) & (tried["subject"] == "all")])
-        bench = _Bench(
-            in_use(list(evidence.from_table(rows))), effects, {*near, *(e for _, es in chosen for e in es)}, about.iloc[0], evaluation
-        )
+        bench = _Bench(windows, effects, {*near, *(e for _, es in chosen for e in es)}, level, evaluation)
         plants = _plants(signals, pushes, coverage[coverage["subject"] == subject], str(axis), evaluation)
         called = {str(r["trial"]): names(r["trial"], r["task"], str(r["files"]).split(" + ")) for _, r in coverage.iterrows()}
         trials = [Trial(w.trial, frozenset(called[w.trial])) for w in bench.windows]
@@ -112,19 +114,18 @@ def _plants(
 
 
 class _Bench:
-    """Windows of one subject and axis, on which models are tried."""
+    """Windows of one subject and axis, on which models are tried.  level: w2 [1/s2] and lever per acceleration [s2]."""
 
     def __init__(
-        self, windows: list[Weak], effects: Catalogue, wanted: set[str], about: pd.Series, evaluation: Mapping[str, Any]
+        self, windows: list[Weak], effects: Catalogue, wanted: set[str], level: tuple[float, float], evaluation: Mapping[str, Any]
     ) -> None:  # fmt: skip
         self.windows, self.effects, self.evaluation = windows, effects, evaluation
         able = {k for k in windows[0].terms if all(k in w.terms for w in windows)}
         self.offered = sorted(wanted & able)
-        self.w2, self.h = float(about["w2"]), float(about["h"])
+        self.w2, self.h = self.level = level
         self.sums = sums(windows, self.offered, self.w2, self.h)
         self.weight = decisive(self.sums) / tolerance(self.sums)
         self.fixed = evaluation["w2"] == "height"
-        self.about = about
         faults = float(FAULT * motion([windows], ("kinematic",))[0])
         self.contact = outer.find(windows, faults) if CONTACT in wanted else None
 
@@ -141,7 +142,7 @@ class _Bench:
 
     def _with_contact(self, contact: outer.Contact, members: Sequence[str], trials: Sequence[Trial]) -> Iterator[dict[str, Any]]:
         """The same with a contact beside the plates: the rest is fitted where it does not act; no free run, as nobody measured it."""
-        still = _Bench(outer.quiet(self.windows, contact), self.effects, set(members), self.about, self.evaluation)
+        still = _Bench(outer.quiet(self.windows, contact), self.effects, set(members), self.level, self.evaluation)
         number = {w.trial: k for k, w in enumerate(still.windows)}
         rest = [self.error(w, self.fit(()), ()) for w in self.windows]
         judged: set[str] = set()

@@ -59,6 +59,7 @@ class Effect:
     recording that tells them apart. columns, force: signals -> (n, k) [m/s2 per unit of the coefficient], see the module; vertical:
     the same for z'' + g = Fz/m. values: (coefficients (k,), constant of the kinematic side [N]) -> parameters, where they are not the
     same. undo: (channels, parameters) -> channels without it. settled: fitted always and taken out before anything else is judged.
+    searched: False for what would explain any fault of the markers: it is judged where the user adds it, and never looked for.
     recorded: what is recorded differs from the truth, not what the body does.
     twin: id of an effect, or w2, that no recording of motion can tell it from; it is never searched for, only named beside it. law:
     for control effects, see ``plumbline/control``. id, file: filled in by the catalogue.
@@ -79,6 +80,7 @@ class Effect:
     separated: str = ""
     settled: bool = False
     recorded: bool = False
+    searched: bool = True
     twin: str = ""
     law: Any = None
     id: str = ""
