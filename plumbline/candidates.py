@@ -46,8 +46,9 @@ def candidates(
             out[name] = Candidate(name, "idle", reason=_untried(effect))
     for one in refused:
         for name in one.effects:
-            if name in out and out[name].status == "idle" and name in one.reason:
-                out[name] = replace(out[name], status="refused", reason=one.reason)
+            mine = name in one.reason or len(one.effects) == 1
+            if name in out and out[name].status in ("idle", "settled", "refused") and mine:
+                out[name] = replace(out[name], status="refused", reason=out[name].reason or one.reason)
     out |= {name: Candidate(name, "lacking", reason=f"cannot be judged: needs {what}") for name, what in lacking.items()}
     return [out[k] for k in sorted(out)]
 

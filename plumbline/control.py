@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from plumbline.control_rows import blank, of_fit
 from plumbline.control_scene import FEWEST_LOCI, Known, Sizes, Stage, staged
 from plumbline.control_shapes import offered
-from plumbline.control_verdict import judge
+from plumbline.control_verdict import COUNTS, judge
 from plumbline.criticism import Outside
 from plumbline.effects import HERE as LIBRARY
 from plumbline.effects import Effect, catalogue, where
@@ -76,15 +76,17 @@ def of_part(
         about = key._asdict()
         faults, others = (dict((c or {}).get(key.subject, {})) for c in (corrected, plant))
         settled = Known(faults, others, every, (contacts or {}).get(key.subject))
-        told: list[list[dict[str, Any]]] = []
-        for readings in _readings(settled):
-            found = staged(about, mine, signals, pushes, coverage, trust, clusters, controller, readings)
+        best: list[dict[str, Any]] = []
+        for reading in _readings(settled):
+            if best and _accused(best, every) <= (0.0, COUNTS):
+                break  # the record read as it was found asks nothing of the law
+            found = staged(about, mine, signals, pushes, coverage, trust, clusters, controller, reading)
             if isinstance(found, str):
-                told.append([blank() | about | {"reason": found}])
-                continue
-            known = {k: e for k, e in known.items() if _works(e, found)}
-            told.append([row | about for row in _ledger(found, known, tuple(sorted(set(model) & set(known))))])
-        best = min(told, key=lambda rows: _accused(rows, every)) if len(told) > 1 else told[0]
+                told = [blank() | about | {"reason": found}]
+            else:
+                known = {k: e for k, e in known.items() if _works(e, found)}
+                told = [row | about for row in _ledger(found, known, tuple(sorted(set(model) & set(known))))]
+            best = min(best, told, key=lambda one: _accused(one, every)) if best else told
         rows += best
     return pd.DataFrame(rows, columns=[c.name for c in TABLES["control"]])
 
@@ -94,7 +96,7 @@ def _readings(settled: Known) -> Iterator[Known]:
     yield settled
     for twin in settled.effects.values():
         sizes = settled.faults.get(twin.twin)
-        if sizes and twin.undo is not None and not twin.parameters[0].refusal(sizes[0]):
+        if sizes and Path(twin.file).parent == LIBRARY and twin.undo is not None and not twin.parameters[0].refusal(sizes[0]):
             others = {k: v for k, v in settled.faults.items() if k != twin.twin}
             yield settled._replace(faults={**others, twin.id: sizes})
 

@@ -152,7 +152,7 @@ class Known(NamedTuple):
 
     @property
     def anew(self) -> bool:
-        """Whether omega and regimes of the signals as recorded do not hold."""
+        """Whether the omega of the signals as recorded does not hold."""
         return bool(self.faults or self.moved)
 
 
@@ -175,7 +175,8 @@ def _applied(
     if not sizes:
         return frames
     mass = dict(zip(coverage["trial"], coverage["mass"], strict=True))
-    names = sorted(set(sizes) & set(known))
+    # delays first: the others are told by a force that is in time
+    names = sorted(set(sizes) & set(known), key=lambda n: (known[n].parameters[0].unit != "s", n))
     pieces = []
     for trial, one in frames.groupby("trial", sort=False, observed=True):
         channels = replace(of_trial(one, "lateral", float(mass.get(trial, np.nan)), person), w2=omega**2)

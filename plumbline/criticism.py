@@ -53,7 +53,7 @@ def of_part(
                 continue
             told = look(got, finding, signals, mine, effects) if finding.left or finding.shapes else None
             rows.append(findings.judged(axis, subject, finding, sizes([got]), gravity(got), lever(finding, got), told))
-            tried += findings.scaled(findings.candidates(axis, subject, finding, plant), outer.scale(got))
+            tried += findings.scaled(findings.candidates(axis, subject, finding, plant), _scale([got], plant))
     return evidence.to_table(windows), _table("judged", rows), _table("candidates", tried)
 
 
@@ -78,12 +78,22 @@ def of_cohort(
             most = max((findings.Told(r["follows"], json.loads(r["formulas"])) for _, r in able.iterrows()), key=lambda t: len(t.formulas))
             told = most if finding.left or finding.shapes else None
             rows.append(_table("judged", [findings.judged(axis, "all", finding, sizes(each), w2, float(able["h"].mean()), told)]))
-            more.append(_table("candidates", list(findings.candidates(axis, "all", finding, plant))))
+            said = findings.scaled(findings.candidates(axis, "all", finding, plant), _scale(each, plant))
+            more.append(_table("candidates", list(said)))
         else:
-            said = alone.loc[alone["axis"] == axis, "reason"]
-            why = said.iloc[0] if len(said) else "no trial could be used"
+            reasons = alone.loc[alone["axis"] == axis, "reason"]
+            why = reasons.iloc[0] if len(reasons) else "no trial could be used"
             rows.append(_table("judged", [findings.unjudged(axis, "all", (0, 0), why)]))
     return pd.concat(rows, ignore_index=True), pd.concat(more, ignore_index=True)
+
+
+def _scale(each: Sequence[Sequence[Weak]], plant: Mapping[str, Effect]) -> outer.Scale | None:
+    """The scale of the plates in the odd trials of some subjects; its size only of a single subject."""
+    most = plant["force_scale"].parameters[0].upper if "force_scale" in plant else 0.0
+    told = [one for one in (outer.scale(windows, most) for windows in each) if one is not None]
+    if len(told) < 2:
+        return told[0] if told else None
+    return outer.Scale({k: v for one in told for k, v in one.trials.items()}, None)
 
 
 def plant_effects(effects: Mapping[str, Effect]) -> dict[str, Effect]:
@@ -234,7 +244,7 @@ class Outside(NamedTuple):
     acts: Mapping[str, Sequence[tuple[int, int]]]
 
 
-class Settled(NamedTuple):
+class Causes(NamedTuple):
     """What was found in each subject's lateral motion, as the control ledger takes it out.
 
     faults: of records, subject -> effect -> parameters where it can undo itself, else coefficients.  others: the same of what the body
@@ -246,7 +256,7 @@ class Settled(NamedTuple):
     contacts: dict[str, Outside]
 
 
-def known(judged: pd.DataFrame, tried: pd.DataFrame, effects: Mapping[str, Effect]) -> Settled:
+def known(judged: pd.DataFrame, tried: pd.DataFrame, effects: Mapping[str, Effect]) -> Causes:
     """What the tables `judged` and `candidates` say that the control ledger needs."""
     faults: Sizes = {}
     others: Sizes = {}
@@ -257,7 +267,7 @@ def known(judged: pd.DataFrame, tried: pd.DataFrame, effects: Mapping[str, Effec
         for _, row in rows.iterrows():
             name, values = str(row["effect"]), {k: v["value"] for k, v in json.loads(row["parameters"]).items()}
             if name == CONTACT:
-                contacts[about["subject"]] = Outside(values, json.loads(about["acts"]))
+                contacts[about["subject"]] = Outside(values, json.loads(about.get("acts", "{}")))
             if "e0" in values:  # a shift of the CoM is one of the CoP, the other way
                 faults.setdefault(about["subject"], {})["offset"] = [-values["e0"]]
             if name not in effects or (name not in theta and name not in ("offset", "tilt")):
@@ -265,4 +275,4 @@ def known(judged: pd.DataFrame, tried: pd.DataFrame, effects: Mapping[str, Effec
             direct = effects[name].undo is not None or name not in theta
             sizes = [*values.values()] if direct else theta[name]
             (faults if effects[name].recorded else others).setdefault(about["subject"], {})[name] = sizes
-    return Settled(faults, others, contacts)
+    return Causes(faults, others, contacts)

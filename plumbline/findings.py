@@ -79,11 +79,12 @@ def scaled(rows: Iterator[Row], scale: Scale | None) -> Iterator[Row]:
     It is put right before anything else: each trial has the body mass that its own plates tell.
     """
     for row in rows:
-        if scale is not None and row["effect"] == "force_scale" and row["status"] != "found":
+        if scale is not None and row["effect"] == "force_scale" and row["status"] not in ("found", "lacking"):
             each = ", ".join(f"{trial} ({100 * v:+.1f} %)" for trial, v in scale.trials.items())
-            said = f"the plates carry {'more' if scale.s[0] > 0 else 'less'} than most of the time, taken out of {each}"
-            size = {"s": {"value": scale.s[0], "unit": "1", "ci95": list(scale.s[1:])}}
-            row |= {"status": "settled", "parameters": json.dumps(size), "reason": said}
+            said = f"the plates carry more or less than most of the time, taken out of {each}"
+            size = {"s": {"value": scale.s[0], "unit": "1", "ci95": [_plain(v) for v in scale.s[1:]]}} if scale.s else {}
+            reason = "; ".join(filter(None, (said, row["reason"])))
+            row |= {"status": "settled", "parameters": json.dumps(size), "reason": reason}
         yield row
 
 

@@ -35,8 +35,9 @@ class Found:
 class Candidate:
     """What became of an effect of the catalogue.
 
-    status: found, settled (fitted always, too small for a name), idle (brings nothing), refused, absorbed, alike (of a family that is
-    named) or lacking.  error: held-out error with it beside the final model [m].  low, high: 95 % interval of the fall that it brings [m].
+    status: found, settled (fitted always, not needed enough for a name), idle (brings nothing), refused, absorbed, alike (of a family
+    that is named) or lacking.  error: held-out error with it beside the final model [m].
+    low, high: 95 % interval of the fall that it brings [m].
     p: of no such effect.  q: the same, false discovery rate over the catalogue.  vif: variance inflation beside the final model.
     trials: that would find such an effect with 80 % power.  reason: in words.  parameters: as in `Found`, of what is settled.
     """

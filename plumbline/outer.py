@@ -17,6 +17,7 @@ from scipy.special import stdtrit
 from scipy.stats import ttest_1samp
 
 from plumbline.evidence import Weak, split
+from plumbline.filters import runs
 from plumbline.found import Candidate, Finding, Found, Interval
 from plumbline.physics import G
 from plumbline.search import BASE, CLUSTERS, design
@@ -26,6 +27,7 @@ Mask = NDArray[np.bool_]
 
 CONTACT = "push"  # id of the effect
 LOUD = 5.0  # [1] times noise and usual faults, from which on something acts
+ALIKE = 3  # trials from which on most of them tell what is usual
 LOAD = 0.02  # [1] of body weight, the same for what the plates do not carry
 LATERAL = 0.002  # [1] of body weight, the same for a force to the side
 REST = 0.35  # [1] share of windows in which nothing must act
@@ -37,6 +39,7 @@ EVEN_NOISE = 1.5  # [1] times the noise, the same
 FULL = 0.2  # [1] of its usual size, from which on a load that the record cuts short is one: bodies bounce
 GAP = 1.5  # [1] of the distance of windows, from which on there is one between them
 LOWER = 0.9  # [1] of the error without it, which it must reach
+LAST = 2**31 - 1  # a frame after the last of any record
 LONG = 0.3  # [s] that it must act at a time
 
 
@@ -97,33 +100,31 @@ def masses(windows: Sequence[Weak]) -> dict[str, float]:
 
 
 class Scale(NamedTuple):
-    """Plates that carry more, or less, in some trials than most of the time.  s: share with its 95 % interval.  trials: share in each."""
+    """Plates that carry more or less in some trials than most of the time.
 
-    s: Interval
+    trials: share in each [1].  s: their mean with its 95 % interval from trial to trial, NaN of a single one; None where signs differ.
+    """
+
     trials: Mapping[str, float]
+    s: Interval | None
 
 
-def scale(windows: Sequence[Weak]) -> Scale | None:
-    """The scale of the plates in the trials where it matters; None where it matters in none.
+def scale(windows: Sequence[Weak], possible: float = np.inf) -> Scale | None:
+    """The scale of the plates in the trials where it matters; None where it matters in none, or where too few trials tell what is usual.
 
     One who weighs more in one trial than in the next has put something on, or stands on plates that read too much.
+    possible: largest share [1]; what takes more is no scale.
     """
     each = _masses(windows)
     usual = _usual(each)
-    shares = {k: m / usual - 1 for k, m in each.items() if _steady(m)}
-    odd = {k: v for k, v in shares.items() if abs(np.median(v)) > LOAD / 2}
-    if not odd:
+    shares = {k: float(np.median(m)) / usual - 1 for k, m in each.items() if _steady(m)}
+    odd = {k: v for k, v in shares.items() if LOAD / 2 < abs(v) <= possible}
+    if not odd or len(each) < ALIKE:
         return None
-    side = np.sign(max((float(np.median(v)) for v in odd.values()), key=abs))
-    odd = {k: v for k, v in odd.items() if side * np.median(v) > 0}
-    every = np.concatenate(list(odd.values()))
-    # test functions that overlap by more than half tell the same
-    number = max(2.0, sum(float(np.ptp(w.time)) / w.bump.half_width for w in windows if w.trial in odd))
-    half = float(stdtrit(number - 1, 0.975) * np.std(every) / np.sqrt(number))
-    mean = float(every.mean())
-    if abs(mean) - half < LOAD / 2:
-        return None
-    return Scale((mean, mean - half, mean + half), {k: float(v.mean()) for k, v in odd.items()})
+    values = np.array(list(odd.values()))
+    half = float(stdtrit(len(odd) - 1, 0.975) * values.std(ddof=1) / np.sqrt(len(odd))) if len(odd) > 1 else float("nan")
+    mean = float(values.mean())
+    return Scale(odd, (mean, mean - half, mean + half) if abs(np.sign(values).sum()) == len(values) else None)
 
 
 def _masses(windows: Sequence[Weak]) -> dict[str, Array]:
@@ -176,7 +177,7 @@ def _acts(windows: Sequence[Weak], residual: Sequence[Array], least: float, nois
 def _runs(loud: Mask, time: Array, *, full: Mask | None = None) -> Mask:
     """Without runs shorter than LONG, but for those that reach `full` and that a beginning, an end or a gap may have made short."""
     out = loud.copy()
-    gap = np.concatenate([[True], np.diff(time) > GAP * np.median(np.diff(time)), [True]]) if len(time) > 1 else np.ones(2, bool)
+    gap = _gaps(time)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], loud.view(np.int8), [0]])))
     for a, b in zip(edges[::2], edges[1::2], strict=True):
         cut = full is not None and full[a:b].any() and (gap[a] or gap[b])
@@ -315,15 +316,28 @@ def named(
 
 
 def spans(windows: Sequence[Weak], contact: Contact) -> dict[str, list[tuple[int, int]]]:
-    """Trial -> first and last frame of each time that a contact acts."""
+    """Trial -> first and last frame of each time that a contact acts.
+
+    Beside a gap of the windows (a push) it is taken to act to its middle, beside an end of the record to that: it is not seen there.
+    """
     out: dict[str, list[tuple[int, int]]] = {}
-    forces = contact.pull if contact.lateral else contact.load
+    forces = contact.load if contact.vertical else contact.pull
     for w, loud, force in zip(windows, contact.loud, forces, strict=True):
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], loud.view(np.int8), [0]])))
-        for a, b in zip(edges[::2], edges[1::2], strict=True):
-            frames = w.frame[a:b][_half(force[a:b])]
-            out.setdefault(w.trial, []).append((int(frames[0]), int(frames[-1])))
+        acts = np.zeros(len(loud), bool)
+        for a, b in runs(loud):
+            acts[a:b] = _half(force[a:b])
+        gap = _gaps(w.time)
+        for a, b in runs(acts):
+            first = w.frame[a] if not gap[a] else (w.frame[a - 1] + w.frame[a]) // 2 + 1 if a else 0
+            last = w.frame[b - 1] if not gap[b] else (w.frame[b - 1] + w.frame[b]) // 2 if b < len(acts) else LAST
+            out.setdefault(w.trial, []).append((int(first), int(last)))
     return out
+
+
+def _gaps(time: Array) -> Mask:
+    """Whether windows are missing before each, and after the last, (n + 1,)."""
+    steps = np.diff(time)
+    return np.concatenate([[True], steps > GAP * np.median(steps), [True]]) if len(time) > 1 else np.ones(len(time) + 1, bool)
 
 
 def _half(force: Array) -> Mask:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from plumbline.contest import FALL, Case, Need, Refused, case_of, constant, need
 from plumbline.effects import Effect
 from plumbline.evidence import Weak
 from plumbline.false_discovery import false_discovery_rate
-from plumbline.found import Finding, Found, Interval
+from plumbline.found import Candidate, Finding, Found, Interval
 from plumbline.outer import CONTACT
 from plumbline.search import Fit, Sums, on_disk, sums
 from plumbline.shapes import BESIDE, SHAPES
@@ -38,6 +38,7 @@ LOWER = 0.9  # [1] of the error without it, which a constant must reach
 SHOWS = 0.6  # [1] of what noise and usual faults leave, by which an effect of any motion must lower the rms to be named
 SAME = 0.1  # [1] share of its fall that a member may lose when another effect takes its place, and the data cannot tell them apart
 CHANCE = 0.05  # [1] false discovery rate over the catalogue, below which an effect is named
+CONSTANT = ("=moment", "=kinematic")
 ALWAYS = ("ang_mom", "height")  # physics has them in any motion; what they explain is not left, named or not
 
 
@@ -81,8 +82,6 @@ def _beside_contacts(windows: Sequence[Sequence[Weak]], effects: Mapping[str, Ef
     h = h or [LEANS / w for w in w2]
     mine = [w2[k] for k in able], [h[k] for k in able]
     finding = _judge(_Made(lambda i: still(able[i]), len(able)), effects, *mine)
-    if (finding.left or finding.shapes) and not any(c.vertical for c in contacts if c):
-        return _judge(windows, effects, w2, h)  # a force to the side beside something that nobody explains may be a part of that
     told = outer.named(finding, _Made(lambda i: windows[able[i]], len(able)), [contacts[k] for k in able], *mine)
     return told or _judge(windows, effects, w2, h)
 
@@ -184,38 +183,70 @@ def _finding(
     stand: tuple[Sequence[Sequence[float]], float],
 ) -> Finding:  # fmt: skip
     needs = {n: need(case, members, n) for n in (*members, *case.settled) if n in members or not case.twins[n] & set(members)}
-    named = [n for n in (*members, *case.settled) if n in needs and n not in SHAPES and _matters(case, members, n, needs[n])]
-    # many causes at once can put on the look of one that no list has: they must hold together all the better
-    over, left = _over(case, members), _left(case, members, LEFT if len(named) > MANY else WHOLE)
-    shapes = tuple(n for n in members if n in SHAPES and n not in BESIDE)
-    behind = {n: _behind(case, members, n) for n in named if n in case.settled}
-    shapes = tuple(dict.fromkeys((*shapes, *filter(None, behind.values()))))
-    refused = [*refused, *(Refused((n,), float("nan"), f"vanishes beside {SHAPES[k].title}") for n, k in behind.items() if k)]
-    named = [n for n in named if not behind.get(n)]
-    if left or shapes:  # what nobody explains may look like any effect a little
-        most = max(o * u for o, u, w in zip(over.values(), case.usual * case.as_zmp, case.weight, strict=True) if w > 0)
-        drowned = max(over[e] for e, z in zip(over, case.weight * case.as_zmp, strict=True) if z > 0) > DROWNED
-        doubtful = [n for n in named if drowned or needs[n].fall < PLAIN or needs[n].share * case.usual[-1] < most or not needs[n].lowers]
-        refused = [*refused, *(Refused((n,), float("nan"), "small beside what nobody explains") for n in doubtful)]
-        named = [n for n in named if n not in doubtful]
+    told = _doubted(case, members, needs)
+    refused = [*refused, *told.refused]
     whole = len(case.equations) - 1
-    kept = constants(case, members, *stand) if CONSTANTS[0] not in lacking and not (left or shapes) else []
-    if kept and not _lowered(case, (*members, *named), {c for one in kept for c in one.columns}):
+    kept = constants(case, members, *stand) if CONSTANTS[0] not in lacking and not (told.left or told.shapes) else []
+    if kept and not _lowered(case, told.model, {c for one in kept for c in one.columns}):
         kept = []
-    silent = tuple({"=moment", "=kinematic"} - {c for one in kept for c in one.columns})
-    final = case.left_out((*members, *named), () if case.placed(members) else silent)
-    base = case.left_out((), ("=moment", "=kinematic"))
-    if named and final > WORSE * base:
-        refused = [*refused, *(Refused((n,), final, "the error on trials left out grows with it") for n in named)]
-        named, final = [], base
-    found = [_found(case, members, n, needs[n], final) for n in named]
+    silent = tuple({*CONSTANT} - {c for one in kept for c in one.columns})
+    final = case.left_out(told.model, () if case.placed(told.model) else silent)
+    found = [_found(case, members, n, needs[n], final) for n in told.named]
     for one in kept:
         found = _with_constant(found, one.effect, one.family, one.parameters, final, one.size, one.p)
     fits = [case.fit(s, members) for s in case.sums]
     theta = [{n: f.of(s, n)[0] for n in dict.fromkeys(s.columns[c][0] for c in f.columns)} for s, f in zip(case.sums, fits, strict=True)]
     tried = candidates(case, members, found, needs, refused, absorbed, lacking)
-    tried = [replace(c, parameters=_parameters(case, members, c.effect)) if c.status == "settled" else c for c in tried]
-    return Finding(found, shapes, refused, tried, lacking, base, final, float(case.floor[whole]), over, left, theta)
+    tried = [_sized(case, members, c) if c.status == "settled" else c for c in tried]
+    base = case.left_out((), CONSTANT)
+    return Finding(found, told.shapes, refused, tried, lacking, base, final, float(case.floor[whole]), told.over, told.left, theta)
+
+
+class _Told(NamedTuple):
+    """What of a model may be said: effects to name, those refused, shapes that are needed, residual over noise and faults and where it is
+    left, and the effects that the last error is with."""
+
+    named: list[str]
+    refused: list[Refused]
+    shapes: Set
+    over: dict[str, float]
+    left: tuple[str, ...]
+    model: Set
+
+
+def _doubted(case: Case, members: Set, needs: Mapping[str, Need]) -> _Told:
+    """Effects that matter, less those that may be the shadow of something that nobody explains."""
+    named = [n for n in needs if n not in SHAPES and _matters(case, members, n, needs[n])]
+    # many causes at once can put on the look of one that no list has: they must hold together all the better
+    over, left = _over(case, members), _left(case, members, LEFT if len(named) > MANY else WHOLE)
+    behind = {n: _behind(case, members, n) for n in named if n in case.settled}
+    refused = [Refused((n,), float("nan"), f"vanishes beside {SHAPES[k].title}") for n, k in behind.items() if k]
+    named = [n for n in named if not behind.get(n)]
+    shapes = tuple(dict.fromkeys((*(n for n in members if n in SHAPES and n not in BESIDE), *filter(None, behind.values()))))
+    if left or shapes:  # what nobody explains may look like any effect a little
+        most = max(o * u for o, u, w in zip(over.values(), case.usual * case.as_zmp, case.weight, strict=True) if w > 0)
+        drowned = max(over[e] for e, z in zip(over, case.weight * case.as_zmp, strict=True) if z > 0) > DROWNED
+        doubtful = [n for n in named if drowned or needs[n].fall < PLAIN or needs[n].share * case.usual[-1] < most or not needs[n].lowers]
+        refused += [Refused((n,), float("nan"), "small beside what nobody explains") for n in doubtful]
+        named = [n for n in named if n not in doubtful]
+    model = (*members, *(n for n in named if n not in members))
+    base, final = case.left_out((), CONSTANT), case.left_out(model, () if case.placed(model) else CONSTANT)
+    if not named or final <= WORSE * base:
+        return _Told(named, refused, shapes, over, left, model)
+    # it suits each half of the equation and not the whole: what the whole lacks is something else
+    refused += [Refused((n,), final, "the error on trials left out grows with it") for n in named]
+    if base > LEFT * case.usual[-1]:
+        left = tuple(dict.fromkeys((*left, "whole")))
+        over = over | {"whole": float(base / case.usual[-1])}
+    return _Told([], refused, shapes, over, left, ())
+
+
+def _sized(case: Case, members: Set, settled: Candidate) -> Candidate:
+    """An effect that is always fitted, with its size; refused where it cannot be."""
+    said = case.refusal(members, settled.effect)
+    if said:
+        return replace(settled, status="refused", reason=said)
+    return replace(settled, parameters=_parameters(case, members, settled.effect))
 
 
 def motion(windows: Sequence[Sequence[Weak]], equations: Sequence[str]) -> Array:

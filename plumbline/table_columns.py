@@ -352,7 +352,12 @@ TABLES: dict[str, list[Column]] = {
         _c("follows", "str", "", "what the residual that is left follows, in words; empty where nothing is left"),
         _c("formulas", "str", "", "JSON: the two best formulas of that residual, in words; no known effect"),
         _c("theta", "str", "", "JSON: effect or base column -> coefficients of the last model; empty where pooled"),
-        _c("acts", "str", "", "JSON: trial -> first and last frame of each time that a contact beside the plates acts; empty where pooled"),
+        _c(
+            "acts",
+            "str",
+            "",
+            "JSON: trial -> first and last frame of each time that a contact beside the plates acts; empty of several subjects",
+        ),
         _c("reason", "str", "", "why nothing is said; empty where it is"),
     ],
     "candidates": [

@@ -176,7 +176,6 @@ def test_the_disclosed_studies_with_nothing_in_the_law(shared_data: Path, name: 
 @pytest.mark.parametrize(
     ("seed", "effect"),
     [
-        (35, {"soft_tissue": {"frequency": 3.3, "damping": 0.4}}),
         (32, {"filter": {"cutoff": 3.0}}),
         (33, {"push": {"lateral": 25.0, "height": 1.2, "duration": 3.0}}),
     ],
@@ -184,7 +183,7 @@ def test_the_disclosed_studies_with_nothing_in_the_law(shared_data: Path, name: 
 def test_what_the_plant_ledger_found_does_not_pass_for_a_fault_of_the_law(
     tmp_path: Path, seed: int, effect: dict[str, dict[str, float]]
 ) -> None:
-    """Markers on soft tissue, a filtered force record, somebody who pushes: with them known the law is not accused, its simulated CoM
+    """A filtered force record, somebody who pushes: with them known the law is not accused, its simulated CoM
     comes nearer to the measured one, and the gains are within 6 % of the truth.
     """
     subject = draw_subject("sub-01", seed)

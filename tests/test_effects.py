@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.signal import bilinear, butter, lfilter
 
 from plumbline.effects import Channels, Effect, Parameter, catalogue
 from plumbline.effects._channels import Person, derivative, of_trial
@@ -85,6 +86,32 @@ def test_undo_takes_out_what_the_columns_describe(name: str) -> None:
     expected = amount[0] * (scaled if name == "com_bias" else effect.columns(c)[inner, 0])
     # channels are moved along straight lines between frames: half a frame of their bend is left
     np.testing.assert_allclose(change, expected, atol=0.06 * np.abs(expected).max())
+
+
+def test_a_filter_and_soft_tissue_are_undone_in_channels() -> None:
+    """A Butterworth filter of 3 Hz and a wobble of 4 Hz: what they did to a motion below 1 Hz falls to a twentieth, and to a third; runs
+    beside a gap are undone each by itself.
+    """
+    rate, w2 = 200.0, 9.0
+    t = np.arange(0, 12, 1 / rate)
+    waves = [(0.03, 2 * np.pi * 0.35, 0.0), (0.01, 2 * np.pi * 0.9, 1.0)]
+    x = np.sum([size * np.sin(w * t + phase) for size, w, phase in waves], axis=0)
+    pull = -np.sum([size * w**2 * np.sin(w * t + phase) for size, w, phase in waves], axis=0)
+    p = x - pull / w2
+    late = np.asarray(lfilter(*butter(2, 3.0, fs=rate), p))
+    late[1000:1010] = np.nan
+    made = Channels({"zmp_x": late, "time": t}, rate, 70.0, 1.0, w2)
+    assert PLANT["filter"].undo is not None
+    back = PLANT["filter"].undo(made, np.array([np.sqrt(2) / (2 * np.pi * 3.0)])).zmp_x
+    inner = np.isfinite(back) & (t > 1) & (t < 11)
+    assert np.isfinite(back).sum() == np.isfinite(late).sum()
+    assert np.std((back - p)[inner]) < np.std((late - p)[inner]) / 20
+    w = 2 * np.pi * 4.0
+    soft = np.asarray(lfilter(*bilinear([0.4 * w, w**2], [1.0, 0.4 * w, w**2], fs=rate), x))
+    assert PLANT["soft_tissue"].undo is not None
+    recorded = Channels({"com_x": soft, "grf_x": 70.0 * pull, "time": t}, rate, 70.0, 1.0, w2)
+    bone = PLANT["soft_tissue"].undo(recorded, np.array([4.0])).com_x
+    assert np.std((bone - x)[t > 1]) < np.std((soft - x)[t > 1]) / 3
 
 
 def test_own_effect_is_a_full_member_at_once(tmp_path: Path) -> None:

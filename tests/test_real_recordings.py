@@ -135,6 +135,7 @@ def test_small_faults_of_the_record_are_told_with_their_intervals(walker: Critic
             assert told["value"] == pytest.approx(size, abs=within)
             low, high = told["ci95"]
             assert 0 < low < size < high
+            assert high - low < size
     said = walker.tried.loc[walker.tried["effect"] == "force_scale", "reason"].iloc[0]
     assert "walk_run-04" in said
     assert "static" not in said

@@ -5,8 +5,10 @@ import numpy as np
 from plumbline.batch import slow
 from plumbline.effects._channels import Array, Channels
 from plumbline.effects._effect import Effect, Parameter
+from plumbline.filters import runs
 
 RECORD = ("grf_x", "grf_y", "grf_z", "zmp_x", "zmp_y")
+SHORT = 4  # frames, of which nothing is given back
 BEND = 10.0  # [Hz] smoother of what is given back: two derivatives of noise would drown it, and limits are sharp
 
 
@@ -21,13 +23,13 @@ def force(c: Channels) -> Array:
 
 
 def undo(c: Channels, values: Array) -> Channels:
-    """The force record before a Butterworth filter of second order: 1/H = 1 + tau s + (tau s)^2 / 2, exact."""
+    """The force record before a Butterworth filter of second order: 1/H = 1 + tau s + (tau s)^2 / 2, up to BEND."""
     tau = float(values[0])
 
     def lost(name: str) -> Array:
         y = tau * c[f"{name}_dot"] + tau**2 / 2 * c[f"{name}_ddot"]
-        known = np.isfinite(y)
-        y[known] = slow(y[known], c.rate, BEND)
+        for a, b in runs(np.isfinite(y)):
+            y[a:b] = slow(y[a:b], c.rate, BEND) if b - a > SHORT else 0.0
         return y
 
     return c.changed(**{k: c[k] + lost(k) for k in RECORD if c.has(k)})

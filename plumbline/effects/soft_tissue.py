@@ -22,8 +22,8 @@ def values(theta: Array, constant: float) -> Array:
 
 
 def undo(c: Channels, values: Array) -> Channels:
-    """The CoM of the bones."""
-    return c.changed(com_x=c.com_x + c.grf_x / c.mass / (2.0 * np.pi * float(values[0])) ** 2)
+    """The CoM of the bones, to first order: frames without shear stay as they are."""
+    return c.changed(com_x=c.com_x + np.nan_to_num(c.grf_x) / c.mass / (2.0 * np.pi * float(values[0])) ** 2)
 
 
 EFFECT = Effect(

@@ -41,7 +41,7 @@ STATUS = {
     "found": "missing",
     "alike": "cannot be told from another",
     "refused": "refused",
-    "settled": "fitted always, too small for a name",
+    "settled": "fitted always, not needed enough for a name",
     "idle": "brings nothing",
     "absorbed": "leaves no trace here",
     "lacking": "cannot be judged",
