@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from plumbline import evidence, outer
+from plumbline import evidence, outer, rungs
 from plumbline.config import with_defaults
 from plumbline.criticism import of_part, settled
 from plumbline.effects import catalogue
@@ -20,6 +20,7 @@ from plumbline.study import find
 
 EVALUATION = with_defaults({"evaluation": {"half_width": 0.3, "exponent": 3, "offset": "train", "w2": "height"}})["evaluation"]
 TASKS = {"static1": "static", "STS1": "sts", "squats1": "squats"}
+WALKING = TASKS | {"walking1": "walk", "walkingTS1": "walk"}
 LOAD = 479.0  # [N] mean of what the seat carries, from the vertical equation of a plain script
 HIPS = ("L_HJC", "R_HJC")
 FOUND = ["axis", "effect", "family", "before", "after"]
@@ -71,7 +72,7 @@ def person(data: Path, tmp_path_factory: pytest.TempPathFactory) -> Criticised:
 
 @pytest.fixture(scope="module")
 def walker(data: Path, tmp_path_factory: pytest.TempPathFactory) -> Criticised:
-    return Criticised(tmp_path_factory.mktemp("walker"), data, {**TASKS, "walking1": "walk", "walkingTS1": "walk"})
+    return Criticised(tmp_path_factory.mktemp("walker"), data, WALKING)
 
 
 @pytest.fixture(scope="module")
@@ -139,3 +140,29 @@ def test_small_faults_of_the_record_are_told_with_their_intervals(walker: Critic
     said = walker.tried.loc[walker.tried["effect"] == "force_scale", "reason"].iloc[0]
     assert "walk_run-04" in said
     assert "static" not in said
+
+
+AP, ML = "forward", "lateral"
+
+
+@pytest.mark.parametrize(
+    ("trained", "judged", "goals"), [("walkingTS1", "walking1", {ML: 8.0, AP: 9.0}), ("walking1", "walkingTS1", {ML: 10.0, AP: 9.5})]
+)
+def test_walking_with_the_shear(walker: Criticised, trained: str, judged: str, goals: dict[str, float]) -> None:
+    """1.3 s of walking, told from the other walk: nothing is looked for in so little, and the user's models have their rungs.
+
+    With the measured shear, angular momentum and height the error is less than a third of the base's (AP) and less than two thirds of it (ML).
+    """
+    chosen = {"train": [trained], "test": [judged], "half_width": 0.15, "exponent": 3, "offset": "train", "w2": "height"}
+    evaluation = with_defaults({"evaluation": chosen})["evaluation"]
+    files = {f"sub-04_task-{task}_run-{k:02d}": f"{name}.trc" for k, (name, task) in enumerate(WALKING.items(), 1)}
+    coverage = walker.coverage.assign(files=walker.coverage["trial"].map(files))
+    table, alone, tried = of_part(walker.signals, walker.pushes, coverage, walker.effects, evaluation)
+    assert alone["reason"].str.contains("are needed").all()
+    models = [("empty", ()), ("shear", ("shear", "ang_mom", "height"))]
+    made, _ = rungs.of_part(walker.signals, walker.pushes, coverage, table, alone, tried, walker.effects, models, evaluation)
+    error = {k: 1e3 * np.sqrt(r["square_sum"].sum() / r["windows"].sum()) for k, r in made.groupby(["axis", "model"])}
+    for axis, goal in goals.items():
+        assert error[axis, "shear"] <= goal
+    assert error[AP, "shear"] < error[AP, "empty"] / 3
+    assert error[ML, "shear"] < error[ML, "empty"] / 1.5
