@@ -20,7 +20,7 @@ from plumbline.control_rows import blank, of_fit
 from plumbline.control_scene import FEWEST_LOCI, Known, Sizes, Stage, staged
 from plumbline.control_shapes import offered
 from plumbline.control_verdict import COUNTS, judge
-from plumbline.criticism import Outside
+from plumbline.criticism import Outside, twins
 from plumbline.effects import HERE as LIBRARY
 from plumbline.effects import Effect, catalogue, where
 from plumbline.estimators import loop_error
@@ -94,11 +94,11 @@ def of_part(
 def _readings(settled: Known) -> Iterator[Known]:
     """What the plant ledger has found, and the same with a fault of a record read as one that no motion tells from it."""
     yield settled
-    for twin in settled.effects.values():
-        sizes = settled.faults.get(twin.twin)
-        if sizes and Path(twin.file).parent == LIBRARY and twin.undo is not None and not twin.parameters[0].refusal(sizes[0]):
-            others = {k: v for k, v in settled.faults.items() if k != twin.twin}
-            yield settled._replace(faults={**others, twin.id: sizes})
+    for name, sizes in settled.faults.items():
+        for twin in twins(name, settled.effects):
+            if not twin.parameters[0].refusal(sizes[0]):
+                others = {k: v for k, v in settled.faults.items() if k != name}
+                yield settled._replace(faults={**others, twin.id: sizes})
 
 
 def _accused(rows: Sequence[Mapping[str, Any]], effects: Mapping[str, Effect]) -> tuple[float, float]:

@@ -90,12 +90,13 @@ class Weak:
 
 def of_part(
     signals: pd.DataFrame, pushes: pd.DataFrame, coverage: pd.DataFrame, effects: Catalogue, evaluation: Mapping[str, Any],
-    *, undo: Mapping[str, Array] | None = None, axis: str = "",
+    *, undo: Mapping[str, Array] | None = None, read: Mapping[str, str] | None = None, axis: str = "",
 ) -> Iterator[Weak]:  # fmt: skip
     """Windows of every trial and axis that has a CoM and a ZMP.
 
     coverage: its rows choose the trials; with the column `files` where the config may call them by their files.
     undo: effect -> coefficients that are taken out of the channels first (effects with `undo`).
+    read: effect -> the one as which it is taken out, where no motion tells the two apart to first order.
     axis: lateral or forward; both where empty.
     """
     chosen = {k: e for k, e in effects.items() if e.ledger == "plant" and e.columns is not None and not e.twin}
@@ -110,7 +111,7 @@ def of_part(
                 channels = channels.changed(grf_x=np.full(len(channels.time), np.nan), grf_y=np.full(len(channels.time), np.nan))
             noise = _noise(channels, plant)  # of what was recorded: between frames some of it is averaged away
             for name, theta in (undo or {}).items():
-                channels = effects[name].undo(channels, theta)  # type: ignore[misc]
+                channels = effects[(read or {}).get(name, name)].undo(channels, theta)  # type: ignore[misc]
             made = of_one(about, channels, here, plant, chosen | SHAPES)
             feet = _feet(channels) if here == "lateral" and about["support"] == "markers" else float("nan")
             used = use(names(about["trial"], about["task"], str(about.get("files", "")).split(" + ")), evaluation)

@@ -354,3 +354,12 @@ def test_one_time_that_the_record_cuts_short_does_not_hide_a_contact(shared_data
     assert outer._uneven(windows, even, loud) < outer.EVEN
     springs = [0.4 + 5 * (w.com - w.com.mean()) for w in windows]
     assert outer._uneven(windows, springs, loud) > outer.EVEN
+
+
+def test_a_force_record_filtered_at_a_low_cut_off_leaves_nothing(tmp_path: Path) -> None:
+    """2.6 Hz delay by 87 ms: read as a delay alone the force would be late and flattened; both readings are tried, the delay within 2 ms."""
+    got = found(made(tmp_path, {"filter": {"cutoff": 2.6}}, seed=27))
+    assert names(got) == {"sync"}
+    assert "filter" in got.found[0].family
+    assert got.left == got.shapes == ()
+    assert got.found[0].parameters["delay"][0] == pytest.approx(np.sqrt(2) / (2 * np.pi * 2.6), abs=2e-3)

@@ -151,7 +151,7 @@ AP, ML = "forward", "lateral"
 def test_walking_with_the_shear(walker: Criticised, trained: str, judged: str, goals: dict[str, float]) -> None:
     """1.3 s of walking, told from the other walk: nothing is looked for in so little, and the user's models have their rungs.
 
-    With the measured shear, angular momentum and height the error is less than a third of the base's (AP) and less than two thirds of it (ML).
+    With the measured shear, angular momentum and height the error is less than a third of the base's (AP), than two thirds of it (ML).
     """
     chosen = {"train": [trained], "test": [judged], "half_width": 0.15, "exponent": 3, "offset": "train", "w2": "height"}
     evaluation = with_defaults({"evaluation": chosen})["evaluation"]
