@@ -357,7 +357,7 @@ def test_one_time_that_the_record_cuts_short_does_not_hide_a_contact(shared_data
 
 
 def test_a_force_record_filtered_at_a_low_cut_off_leaves_nothing(tmp_path: Path) -> None:
-    """2.6 Hz delay by 87 ms: read as a delay alone the force would be late and flattened; both readings are tried, the delay within 2 ms."""
+    """2.6 Hz delay by 87 ms: as a delay alone it would be 90 ms and a flattened force; read as a filter the delay is right within 2 ms."""
     got = found(made(tmp_path, {"filter": {"cutoff": 2.6}}, seed=27))
     assert names(got) == {"sync"}
     assert "filter" in got.found[0].family
