@@ -7,6 +7,7 @@ min_version("9.0")
 
 include: "workflow/rules/common.smk"
 include: "workflow/rules/recording.smk"
+include: "workflow/rules/sesc.smk"
 include: "workflow/rules/signals.smk"
 include: "workflow/rules/loci.smk"
 include: "workflow/rules/trust.smk"

@@ -47,6 +47,30 @@ def com_from_force(grf: Array, zmp: Array, time: Array, mass: float, height: flo
     return out
 
 
+def fused(com: Array, grf: Array, time: Array, mass: float) -> Array:
+    """CoM of markers held together with the force [m], (n, 3): the smoother of a double integrator, slow by `com`, fast by the force.
+
+    The same minimum with the markers' CoM in the place of the gravity line: markers are true in the mean and soft where the body
+    shakes. NaN where one of both is, and in runs shorter than `MIN_RUN`.
+    """
+    out = np.full((len(time), 3), np.nan)
+    if not (np.isfinite(mass) and mass > 0.0) or len(time) < 5:
+        return out
+    step = float(np.median(np.diff(time)))
+    acceleration = grf / mass - np.array([0.0, 0.0, G])
+    for a, b in runs(known(acceleration + com)):
+        if (b - a) * step >= MIN_RUN:
+            out[a:b] = blend(acceleration[a:b] - _zero(acceleration[a:b], com[a:b], step), com[a:b], step, CROSSOVER)
+    return out
+
+
+def _zero(acceleration: Array, com: Array, step: float) -> Array:
+    """Zero error of the force [m/s2], (3,): its mean less what the markers' CoM gained in speed from end to end."""
+    n, edge = len(com), max(len(com) // 20, 2)
+    gained = (com[-1] - com[-1 - edge] - com[edge] + com[0]) / (edge * step)
+    return np.asarray(acceleration.mean(axis=0) - gained / ((n - edge) * step))
+
+
 def blend(acceleration: Array, anchor: Array, step: float, crossover: float) -> Array:
     """Minimiser of the module's integral on an even grid.
 

@@ -1,7 +1,10 @@
 r"""From one recording to its signals: CoM, angular momentum, ground reaction, CoP and ZMP, support limits, raw and low-passed.
 
 CoM: from the segments of a marker set (``table``), as the file holds it (``lab``), and from the forces (``force``); `com_*` is
-the first of these that exists. Positions and forces stay unfiltered in their own columns: the weak form that judges the plant
+the first of these that exists. Beside them the subject's own (``sesc``, from ``plumbline/sesc.py``) and the table's held together
+with the force (``fused``): they are ranked later, the base of the ladder is always the table's.
+
+Positions and forces stay unfiltered in their own columns: the weak form that judges the plant
 integrates by parts and needs no smooth derivative, and a filter would take away part of the motion (2 Hz on cut loci costs 10
 to 15 % of omega). Angular momentum is made of central differences of unfiltered positions and is noisy for the same reason.
 Only `com_lp`, `zmp_lp` and the derivatives are low-passed: second-order Butterworth, forth and back over the continuous
@@ -10,7 +13,7 @@ recording, -3 dB at `cutoff` *after both passes* (``plumbline/filters.py``).
 
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -18,7 +21,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from plumbline import body, contact, filters, forces, noise_band, support
-from plumbline.com_force import CROSSOVER, DEFAULT_HEIGHT, HEIGHT_SHARE, com_from_force
+from plumbline.com_force import CROSSOVER, DEFAULT_HEIGHT, HEIGHT_SHARE, com_from_force, fused
 from plumbline.errors import Refused
 from plumbline.forces import Forces, Plate
 from plumbline.markerset import MarkerSet, choose
@@ -28,6 +31,7 @@ from plumbline.tables import TABLES, joined
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+METHODS = ("table", "lab", "force", "sesc", "fused")
 LAB_COM = ("centreofmass", "centerofmass", "com", "cog", "wholebodycom", "centreofgravity", "centerofgravity")
 
 
@@ -56,16 +60,19 @@ class Signals(NamedTuple):
 
 
 def signals(
-    recording: Recording, participant: Participant, markerset: MarkerSet | None, *, cutoff: float, subject_mass: float = math.nan
-) -> Signals:
+    recording: Recording, participant: Participant, markerset: MarkerSet | None, *, cutoff: float, subject_mass: float = math.nan,
+    own: Array | None = None,
+) -> Signals:  # fmt: skip
     """Signals of one trial.
 
     markerset: None where no set fits; then there is no table CoM.  cutoff: [Hz], -3 dB after the double pass.
     subject_mass: [kg], what the plates say in the subject's other trials; used where this trial does not tell it, before
-    participants.tsv.  Raises Refused ("no_rate") where the frames are too slow for the cut-off.
+    participants.tsv.  own: the subject's own CoM [m], (n, 3).  Raises Refused ("no_rate") where the frames are too slow for the cut-off.
     """
     notes: list[str] = list(markerset.notes) if markerset else []
     made = _made(recording, participant, markerset, subject_mass, notes)
+    if own is not None:
+        made.coms["sesc"] = own
     columns = _columns(recording, markerset, made, cutoff)
     coverage = _coverage(recording, markerset, made, cutoff, notes)
     return Signals(pd.DataFrame({c.name: columns[c.name] for c in TABLES["signals"]}), coverage, notes)
@@ -92,7 +99,8 @@ def _made(recording: Recording, participant: Participant, markerset: MarkerSet |
     notes += force.notes + (frame.notes if frame else [])
     coms = {"table": frame.com() if frame else nothing, "lab": _lab(recording)}
     height = _height(coms, force, participant, notes)
-    coms |= {"force": com_from_force(force.grf, force.zmp, time, mass, height), "none": nothing}
+    coms |= {"force": com_from_force(force.grf, force.zmp, time, mass, height), "none": nothing, "sesc": nothing}
+    coms["fused"] = fused(coms["table"], force.grf, time, mass)
     method = next((m for m in ("table", "lab", "force") if filters.known(coms[m]).any()), "none")
     border = support.limits(outline, markerset, standing, force, recording.plates)
     notes.append(border.note)
@@ -108,7 +116,7 @@ def _columns(recording: Recording, markerset: MarkerSet | None, made: _Made, cut
     com, force, frame = made.coms[made.method], made.force, made.frame
     out: dict[str, Any] = {k: np.full(n, v, dtype=object) for k, v in _key_of(recording.trial).items()}
     out |= {"frame": np.arange(n), "time": time} | _xyz("com", com)
-    for method in ("table", "lab", "force"):
+    for method in METHODS:
         out |= _xyz(f"com_{method}", made.coms[method])
     out |= _xyz("grf", force.grf) | _xyz("zmp", force.zmp) | _per_foot(force, n)
     out |= _xyz("ang_mom", frame.angular_momentum(time, made.mass) if frame else made.coms["none"])
@@ -258,12 +266,14 @@ def _limitations(recording: Recording, frame: body.Body | None, force: Forces, m
 
 
 def of_part(
-    recordings: Iterable[Recording], people: Mapping[str, Participant], markers: str, *, cutoff: float, masses: Mapping[str, float]
-) -> tuple[pd.DataFrame, pd.DataFrame]:
+    recordings: Iterable[Recording], people: Mapping[str, Participant], markers: str, *, cutoff: float, masses: Mapping[str, float],
+    own: Callable[[str], Array | None] = lambda trial: None,
+) -> tuple[pd.DataFrame, pd.DataFrame]:  # fmt: skip
     """Tables `signals` and `coverage` of whole subjects.
 
-    people: rows of participants.tsv by subject.  markers: path of a markerset.yaml, the name of a built-in set, or "auto".
-    masses: from `subject_masses`.  A trial that is too slow for the cut-off has a row in `coverage` that says so, and no signals.
+    people: rows of participants.tsv by subject.  markers: path of a markerset.yaml, the name of a built-in set, or "auto".  masses:
+    from `subject_masses`.
+    own: trial -> the subject's own CoM [m], (n, 3), None where there is none.  A trial that is too slow for the cut-off has a row in `coverage` that says so, and no signals.
     """
     frames, rows = [], []
     for recording in recordings:
@@ -271,7 +281,8 @@ def of_part(
         person = people.get(subject, Participant(subject))
         chosen = choose(markers, recording.markers)
         try:
-            made = signals(recording, person, chosen, cutoff=cutoff, subject_mass=masses.get(subject, math.nan))
+            mass = masses.get(subject, math.nan)
+            made = signals(recording, person, chosen, cutoff=cutoff, subject_mass=mass, own=own(recording.trial.trial))
         except Refused as refusal:
             rows.append(_no_signals(recording.trial, cutoff, refusal))
             continue
@@ -283,6 +294,16 @@ def of_part(
 def subject_masses(trials: pd.DataFrame) -> dict[str, float]:
     """Body mass of each subject [kg]: the median of what the plates say in its trials (columns `subject`, `mass`); NaN where none does."""
     return {str(s): float(m) for s, m in trials.groupby("subject")["mass"].median().items()}
+
+
+def own_com(rows_of: Callable[[str], pd.DataFrame]) -> Callable[[str], Array | None]:
+    """Trial -> the subject's own CoM [m], (n, 3); None where there is none.  rows_of: trial -> its rows of table `sesc`."""
+
+    def of(trial: str) -> Array | None:
+        rows = rows_of(trial)
+        return rows[[f"com_sesc_{a}" for a in "xyz"]].to_numpy() if len(rows) else None
+
+    return of
 
 
 def _no_signals(trial: Trial, cutoff: float, refusal: Refused) -> dict[str, Any]:

@@ -80,6 +80,57 @@ TABLES: dict[str, list[Column]] = {
         *_xyz("cop", "m", "centre of pressure on the plate's surface; NaN while unloaded"),
         _c("free_moment", "float", "N m", "vertical moment about the CoP; NaN while unloaded"),
     ],
+    # -- sesc: the subject's own CoM from still poses
+    "sesc": [
+        *KEY,
+        _c("frame", "int", "", "from 0 within the trial"),
+        *_xyz("com_sesc", "m", "the subject's own CoM; NaN where no still window could be used"),
+        *_xyz("com_sesc_sd", "m", "its predicted standard deviation"),
+        _c("outside", "bool", "", "a segment points further than 0.35 rad from where it pointed in any calibration pose"),
+    ],
+    "chain": [
+        KEY[1],
+        _c("parameter", "str", "", "segment (both sides where none is named) and what of it: mass, along, forward, lateral, up"),
+        _c("unit", "str", "", "of value, sd and prior_sd; 1: a share of the table's mass, or of the segment's length"),
+        _c("value", "float", "", "how far this subject is from the segment table, in `unit`"),
+        _c("sd", "float", "", "its standard deviation"),
+        _c("prior_sd", "float", "", "how far people are from the table"),
+        _c("learnt", "float", "1", "share of that spread that the poses have taken away"),
+    ],
+    "poses": [
+        *KEY,
+        _c("time", "float", "s", "middle of the window, the file's own time"),
+        _c("used", "bool", "", "the window calibrates"),
+        _c("reason", "str", "", "why not; empty where it does"),
+        _c("load", "float", "1", "what the plates carry, of body weight"),
+        _c("shift", "float", "m", "CoM height times horizontal over vertical force: what motion or an unmeasured pull moves the ZMP by"),
+        _c("ground_x", "float", "m", "ground projection of the CoM from all contact forces, right"),
+        _c("ground_y", "float", "m", "the same, forward"),
+        _c("table_error_x", "float", "m", "CoM of the segment table minus ground projection, right"),
+        _c("table_error_y", "float", "m", "the same, forward"),
+        _c("sesc_error_x", "float", "m", "own CoM, told by windows of other trials alone, minus ground projection, right"),
+        _c("sesc_error_y", "float", "m", "the same, forward"),
+    ],
+    "guidance": [
+        KEY[1],
+        _c("windows", "int", "", "still windows behind the calibration"),
+        _c("misfit", "float", "1", "mean square of what is left of them, over what their noise says"),
+        _c("floor", "float", "m", "what no chain follows, raised until the misfit is one"),
+        *[
+            _c(f"{name}_{a}", "bool" if name == "observable" else "float", unit, f"{text}, {w}")
+            for a, w in zip("xyz", ("right", "forward", "up"), strict=True)
+            for name, unit, text in (
+                ("table_sd", "m", "predicted error of the table's CoM over what the subject does"),
+                ("sd", "m", "predicted error of the own CoM"),
+                ("left", "1", "share of the first that is left if the CoP may be off by any constant"),
+                ("observable", "", "that share is below one half"),
+            )
+        ],
+        _c("learnt", "int", "", "directions that the poses tell better than the table does"),
+        _c("parameters", "int", "", "parameters of the chain"),
+        _c("gains", "str", "", "how many times stronger than the prior the poses speak along each direction, JSON list"),
+        _c("next", "str", "", "poses to record next, and the predicted error [m] of right, forward, up after each, JSON"),
+    ],
     # -- signals: one row per frame
     "signals": [
         *KEY,
@@ -89,6 +140,8 @@ TABLES: dict[str, list[Column]] = {
         *_xyz("com_table", "m", "CoM from the segment table, unfiltered"),
         *_xyz("com_force", "m", "CoM by double integration of the force (band-limited; mean from the CoP)"),
         *_xyz("com_lab", "m", "CoM as the file itself holds it"),
+        *_xyz("com_sesc", "m", "the subject's own CoM from still poses (`sesc`)"),
+        *_xyz("com_fused", "m", "CoM of the table held together with the force: above 0.3 Hz the force decides"),
         *_xyz("grf", "N", "net ground reaction, unfiltered"),
         *_xyz("zmp", "m", "net centre of pressure in the ground plane, unfiltered"),
         *_xyz(

@@ -42,7 +42,7 @@ PART_OF = studies.assign(STUDY.subjects, SIZE, studies.read_parts(Path("results/
 PARTS = sorted(set(PART_OF.values()))
 
 
-PART_TABLES = ["trials", "markers", "plates", "signals", "coverage", "loci", "pushes"]
+PART_TABLES = ["trials", "markers", "plates", "sesc", "chain", "poses", "guidance", "signals", "coverage", "loci", "pushes"]
 PART_TABLES += ["trust", "rls", "clusters", "choice", "controller", "fit", "heldout", "residuals", "where"]
 PART_TABLES += ["evidence", "rungs", "contributions", "control"]
 EFFECTS = sorted(str(f) for f in Path("effects").glob("*.py"))  # the study's own

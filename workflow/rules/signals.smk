@@ -4,6 +4,7 @@ rule signals:
         trials="results/trials/{part}.parquet",
         markers="results/markers/{part}.parquet",
         plates="results/plates/{part}.parquet",
+        sesc="results/sesc/{part}.parquet",
         markerset=[STUDY.markerset] if STUDY.markerset and config["markerset"] == "auto" else [],
     output:
         signals="results/signals/{part}.parquet",

@@ -1,0 +1,73 @@
+r"""What a set of poses can and cannot tell of a personal CoM, and which pose to record next.
+
+Poses with feet and hands in the same places leave a direction :math:`v` with :math:`B v` constant: both ends of the body stay where
+they are, so a heavier leg against a lighter arm shifts the CoM by the same vector in all of them. The vector is mostly vertical;
+its small horizontal part is all that the plates see of it, so a constant error of the CoP of 1 mm becomes one of about 3 mm upwards.
+The vertical is therefore called observable only if it is known *without* trusting the CoP to that constant.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plumbline.models.sesc import Prior, spread
+
+Array = NDArray[np.float64]
+
+LEARNT = 0.5  # [1] of the prior's sd: above, what is said of an axis is the prior's
+
+
+class Step(NamedTuple):
+    """A pose worth recording: its name, and the mean predicted sd of the intended motion after it [m], (3,)."""
+
+    pose: str
+    sd: Array
+
+
+def mean_spread(basis: Array, covariance: Array) -> Array:
+    """rms over a motion of the predicted sd [m], per axis (3,).  basis: (n, 3, q)."""
+    return np.asarray(np.sqrt(np.mean(spread(basis, covariance) ** 2, axis=0)))
+
+
+def observable(rows: Array, prior: Prior, constants: Array, motion: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Share of the prior's sd that is left per axis (3,) if the CoP may be off by any constant; and which axes are observable (3,).
+
+    rows: whitened horizontal rows (r, q).  constants: what a constant error of the CoP does to them (r, 2).  motion: basis of the
+    intended motion (n, 3, q).
+    """
+    project, _ = np.linalg.qr(constants)
+    free = rows - project @ (project.T @ rows)
+    left = mean_spread(motion, after(prior.covariance, free)) / mean_spread(motion, prior.covariance)
+    return np.asarray(left), np.asarray(left < LEARNT)
+
+
+def after(covariance: Array, rows: Array) -> Array:
+    """Covariance after rows with unit noise.  covariance: (q, q).  rows: (r, q)."""
+    ph = covariance @ rows.T
+    return np.asarray(covariance - ph @ np.linalg.solve(rows @ ph + np.eye(len(rows)), ph.T))
+
+
+def next_poses(covariance: Array, motion: Array, candidates: Mapping[str, Array], sd: float, count: int = 1) -> Sequence[Step]:
+    """The poses that lower the predicted variance of the motion most (V-optimal), one after the other.
+
+    covariance: of the parameters now (q, q).  motion: basis of the intended motion (n, 3, q).  candidates: name -> basis of a held
+    pose, its horizontal rows (2, q).  sd: of the mean of a held pose [m].
+    """
+    out = list[Step]()
+    gram = np.einsum("nij,nik->jk", motion, motion) / len(motion)
+    for _ in range(count):
+        best = min(candidates, key=lambda k: float(np.sum(gram * after(covariance, candidates[k] / sd))))
+        covariance = after(covariance, candidates[best] / sd)
+        out.append(Step(best, mean_spread(motion, covariance)))
+    return out
+
+
+def outside(directions: Array, known: Array, reach: float) -> NDArray[np.bool_]:
+    """Frames with a segment that points further than `reach` [rad] from where it pointed in any calibration pose, (n,).
+
+    directions: unit vectors (n, s, 3).  known: of the calibration poses (k, s, 3).
+    """
+    nearest = np.max(np.einsum("nsi,ksi->nks", directions, known), axis=1)
+    return np.asarray((nearest < np.cos(reach)).any(axis=1))

@@ -1,0 +1,169 @@
+r"""Each subject's own CoM from still poses, and what these poses cannot tell.
+
+Per frame the own CoM with its predicted sd (table `sesc`), per parameter what was learnt (`chain`), per window what was used and why
+not (`poses`), per subject what is observable and which pose to record next (`guidance`). The segment table's CoM stays beside it.
+"""
+
+import json
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from plumbline import body, contact, forces, guidance, support
+from plumbline.calibration import Person, Trial, person
+from plumbline.filters import known
+from plumbline.markerset import MarkerSet, choose
+from plumbline.models.sesc import Noise, mean_covariance
+from plumbline.person_com import columns
+from plumbline.poses import POSES, posed
+from plumbline.signals import Recording
+from plumbline.still import Gate, windows
+from plumbline.study import Participant
+from plumbline.tables import joined
+
+Array = NDArray[np.float64]
+
+HOLD = 5.0  # [s] that a recommended pose is held
+NEXT = 3  # poses that are recommended
+FRAMES = 300  # frames of a subject that stand for what it does
+REACH = 0.35  # [rad] from the nearest calibration pose, from which on a frame lies outside their range
+UPRIGHT = 0.9  # [1] cosine of a leg's angle with the vertical, from which on a frame shows somebody standing
+
+
+def of_part(
+    recordings: Iterable[Recording], people: Mapping[str, Participant], markers: str, *, masses: Mapping[str, float],
+    tasks: Sequence[str], window: float, limit: float, sides: str, prior: float,
+) -> dict[str, pd.DataFrame]:  # fmt: skip
+    """Tables `sesc`, `chain`, `poses`, `guidance` of whole subjects, by name.
+
+    people, markers, masses: as in :func:`plumbline.signals.of_part`.  tasks: tasks or trials that calibrate, empty: all.  window: length of
+    a still window [s].  limit: by how much motion may move the ZMP off the CoM [m].  sides: free or tied.  prior: the spread of people
+    over the published one [1].
+    """
+    tables: dict[str, list[pd.DataFrame]] = {name: [] for name in ("sesc", "chain", "poses", "guidance")}
+    gate = Gate(window, limit)
+    for subject, group in groupby(recordings, key=lambda r: r.trial.subject):
+        who = people.get(subject, Participant(subject))
+        found = [_trial(r, choose(markers, r.markers), who, masses.get(subject, math.nan), gate, sides == "tied") for r in group]
+        trials = [t for t, _ in found if t is not None]
+        one = person(subject, trials, tasks, prior)
+        if one is None:
+            continue
+        standing = next((b for t, b in found if t is not None and b is not None), None)
+        tables["sesc"] += [_frames(one, t) for t in one.trials]
+        tables["chain"].append(_chain(one))
+        tables["poses"].append(_poses(one, trials, tasks))
+        tables["guidance"].append(pd.DataFrame([_guidance(one, standing)]))
+    return {name: joined(name, frames) for name, frames in tables.items()}
+
+
+def _trial(
+    r: Recording, markerset: MarkerSet | None, who: Participant, mass: float, gate: Gate, tied: bool
+) -> tuple[Trial | None, body.Body | None]:  # fmt: skip
+    """Columns and windows of one recording, None without a CoM from markers; and the body in a frame of it that stands upright."""
+    if markerset is None or not r.markers:
+        return None, None
+    frame = body.build(r.markers, markerset, who.sex)
+    if not known(frame.com()).any():
+        return None, None
+    standing = contact.of_feet(r.markers, support.feet(r.markers, markerset), r.time)
+    weight = mass if np.isfinite(mass) else r.mass
+    made, found = windows(frame, forces.net(r.plates, r.time, standing), r.time, weight, gate, tied)
+    t = r.trial
+    key = {"trial": t.trial, "subject": t.subject, "task": t.task, "condition": t.condition}
+    return Trial(key, r.time, made, found), _upright(frame)
+
+
+def _upright(frame: body.Body) -> body.Body | None:
+    """The body in the frame in which it stands straightest; None where it never stands."""
+    legs = [i for i, n in enumerate(frame.names) if n.startswith(("thigh", "shank"))] or list(range(len(frame.names)))
+    u = frame.distal - frame.proximal
+    u = u / np.linalg.norm(u, axis=2, keepdims=True)
+    down = np.where(known(frame.com()), np.abs(u[:, legs, 2]).min(axis=1), -1.0)
+    best = int(np.argmax(down))
+    if down[best] < UPRIGHT:
+        return None
+    one = slice(best, best + 1)
+    return body.Body(frame.names, frame.numbers, frame.proximal[one], frame.distal[one], np.zeros(1, bool), [], [])
+
+
+# -- rows -------------------------------------------------------------------------------------------------------------
+
+
+def _frames(one: Person, t: Trial) -> pd.DataFrame:
+    com, sd = one.com(t.columns)
+    used = one.calibration.directions
+    out = guidance.outside(t.columns.directions, used, REACH) if len(used) else np.ones(len(com), dtype=bool)
+    if not one.calibration.posterior.rows:
+        com = np.full_like(com, np.nan)  # nothing was learnt: there is only the table
+    xyz = {f"com_sesc_{a}": com[:, i] for i, a in enumerate("xyz")} | {f"com_sesc_sd_{a}": sd[:, i] for i, a in enumerate("xyz")}
+    return pd.DataFrame({**t.key, "frame": np.arange(len(com)), **xyz, "outside": out})
+
+
+def _chain(one: Person) -> pd.DataFrame:
+    p = one.calibration.posterior
+    before, after = np.sqrt(np.diag(p.prior.covariance)), np.sqrt(np.diag(p.covariance))
+    return pd.DataFrame(
+        {
+            "subject": one.subject, "parameter": [x.name for x in one.parameters], "unit": [x.unit for x in one.parameters],
+            "value": p.mean, "sd": after, "prior_sd": before, "learnt": 1.0 - after / before,
+        }
+    )  # fmt: skip
+
+
+def _poses(one: Person, trials: Sequence[Trial], tasks: Sequence[str]) -> pd.DataFrame:
+    rows = []
+    alike = {t.key["trial"] for t in one.trials}
+    for t in trials:
+        chosen = not tasks or bool({t.key["trial"], t.key["task"]} & set(tasks))
+        for w in t.windows:
+            reason = w.reason or ("" if chosen else "not among sesc.tasks")
+            reason = reason if t.key["trial"] in alike else "other segments are seen than in the subject's other trials"
+            told = one.heldout.get((t.key["trial"], w.middle), np.full(3, np.nan))
+            off, table = told[:2] - w.ground, w.table[:2] - w.ground
+            rows.append(
+                t.key | {
+                    "time": w.middle, "used": not reason, "reason": reason, "load": w.load, "shift": w.shift,
+                    "ground_x": w.ground[0], "ground_y": w.ground[1], "table_error_x": table[0], "table_error_y": table[1],
+                    "sesc_error_x": off[0], "sesc_error_y": off[1],
+                }
+            )  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def _guidance(one: Person, standing: body.Body | None) -> dict[str, Any]:
+    """What is known of the CoM over what the subject does, whether the vertical is, and the poses to record next."""
+    c = one.calibration
+    p, noise = c.posterior, c.noise
+    motion = np.concatenate([t.columns.basis[known(t.columns.table)] for t in one.trials])
+    motion = motion[np.unique(np.linspace(0, len(motion) - 1, FRAMES).astype(int))]
+    before, now = guidance.mean_spread(motion, p.prior.covariance), np.hypot(guidance.mean_spread(motion, p.covariance), noise.floor)
+    left, seen = guidance.observable(c.rows.matrix, p.prior, c.constant, motion) if p.rows else (np.ones(3), np.zeros(3, dtype=bool))
+    steps = list(_next(p.covariance, motion, standing, noise)) if standing is not None else []
+    out: dict[str, Any] = {"subject": one.subject, "windows": p.rows // 2, "misfit": p.misfit, "floor": noise.floor}
+    for i, a in enumerate("xyz"):
+        out |= {f"table_sd_{a}": before[i], f"sd_{a}": now[i], f"left_{a}": left[i], f"observable_{a}": bool(seen[i])}
+    gains = [float(g) for g in p.gains if g > 0.01]
+    out |= {"learnt": int(np.sum(p.gains > 1.0)), "parameters": len(p.mean), "gains": json.dumps([round(g, 2) for g in gains])}
+    out |= {"next": json.dumps([{"pose": s.pose, "sd": [round(float(v), 5) for v in s.sd]} for s in steps])}
+    return out
+
+
+def _next(covariance: Array, motion: Array, standing: body.Body, noise: Noise) -> Iterator[guidance.Step]:
+    """The poses to record next, each held for `HOLD`; a constant error of the CoP is one unknown that all of them share."""
+    q = len(covariance)
+    wider = np.zeros((q + 2, q + 2))
+    wider[:q, :q], wider[q:, q:] = covariance, noise.constant**2 * np.eye(2)
+    candidates = {name: np.hstack([columns(posed(standing, name)).basis[0, :2], np.eye(2)]) for name in POSES}
+    padded = np.concatenate([motion, np.zeros((len(motion), 3, 2))], axis=2)
+    yield from guidance.next_poses(wider, padded, candidates, hold_sd(noise), NEXT)
+
+
+def hold_sd(noise: Noise, seconds: float = HOLD, rate: float = 100.0) -> float:
+    """sd of the mean of a held pose [m], without the CoP's constant error."""
+    return float(np.sqrt(mean_covariance(np.zeros(1), seconds, round(seconds * rate), noise)[0, 0] + noise.floor**2))
