@@ -70,7 +70,7 @@ def test_segments_keep_their_length(name: str, request: pytest.FixtureRequest) -
 
 @pytest.mark.parametrize("name", ["paper", "extended", "risen"])
 def test_joints_stay_human(name: str, request: pytest.FixtureRequest) -> None:
-    """Knees and elbows bend one way, up to 150 degrees; the trunk leans less than 90; hips lift less than 130."""
+    """Knees and elbows bend one way, up to 150 degrees; the trunk leans less than 90; hips with the lumbar spine lift less than 140."""
     motion = request.getfixturevalue(name)
     for side in "lr":
         knee, elbow = _flexion(motion, f"shank_{side}", f"thigh_{side}"), _flexion(motion, f"forearm_{side}", f"upper_arm_{side}")
@@ -78,7 +78,7 @@ def test_joints_stay_human(name: str, request: pytest.FixtureRequest) -> None:
         assert knee.max() < 5
         assert elbow.min() > -5
         assert elbow.max() < 150
-        assert _flexion(motion, f"thigh_{side}", "trunk").max() < 130
+        assert _flexion(motion, f"thigh_{side}", "trunk").max() < 140
     assert motion.pose.rotations[:, 0, 2, 2].min() > 0
 
 

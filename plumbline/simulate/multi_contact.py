@@ -28,12 +28,12 @@ from plumbline.simulate.tasks import Pose, Target
 STANCE, FOOT_MIDDLE = 0.15, 0.06  # [m] of the ankles from the middle; of a foot's middle ahead of its ankle
 HANDLE = (0.22, 0.35)  # [m] to the side and forward
 HEIGHTS = (0.80, 1.00, 1.20)  # [m] of the handles; the middle one in the paper's protocol
-STAND, SEAT = (0.0, -0.02, 0.85), (0.0, -0.32, 0.53)  # [m] pelvis on bent knees and on the seat
+STAND, SEAT = (0.0, -0.02, 0.85), (0.0, -0.26, 0.53)  # [m] pelvis on bent knees and on the seat
 CUSHION = 0.08  # [m] from the seat up to the pelvis
 AMPLITUDE = np.array([0.070, 0.050, 0.050])  # [m] of right, forward, up: half of 140, 100, 100 mm
 PERIODS = (321.0, 200.0, 347.0)  # [s] of the same
 FAST = (17.0, 11.0, 23.0)  # [s] the same volume within a minute
-RISE = 0.25  # [1] of the time of standing up in which the trunk leans before the pelvis leaves the seat
+RISE = 0.35  # [1] of the time of standing up in which the trunk leans before the pelvis leaves the seat
 WHITE, COLOURED, MEMORY = 0.003, 0.002, 2.0  # [m], [m], [s] noise of the ground projection per axis
 
 #: knees and elbows bent, hands ahead
@@ -166,7 +166,8 @@ def sit_to_stand(duration: float = 2.0, rate: float = 100.0, *, handles: bool = 
     bow = jerkless(np.clip(t / (RISE + 0.1), 0.0, 1.0))  # over the feet before the seat is left
     lean = -(20.0 + 25.0 * bow) * (1 - jerkless(np.clip((t - RISE - 0.1) / (0.9 - RISE), 0.0, 1.0)))
     trunk = Rotation.from_euler("x", lean[:, None], degrees=True).as_matrix()
-    wanted = np.tile(tasks.posed(READY), (len(time), 1, 1, 1))
+    free = {f"upper_arm_{s}": (50.0, 0.0, 0.0) for s in "lr"}
+    wanted = np.tile(tasks.posed(READY if handles else READY | free), (len(time), 1, 1, 1))
     wanted[:, 0] = trunk
     hands = on_handles(len(time), HEIGHTS[1]) if handles else []
     pose = tasks.solve(start(len(time)), [ankles(len(time)) + hands, [Target(nine.point("pelvis"), pelvis)]], wanted)

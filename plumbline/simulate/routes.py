@@ -92,7 +92,7 @@ def _solved(route: Sequence[Way], places: Array, knots: Array, move: float, hold
     targets = [np.array([w.pelvis for w in route]), np.array([w.trunk for w in route]), places[:, 0], places[:, 1]]
     path = np.round(np.hstack([_along(points, knots, move, hold) for points in targets]), 9)
     _, once, which = np.unique(path, axis=0, return_index=True, return_inverse=True)
-    rows: Array = path[once]
+    rows = np.asarray(path[once], dtype=np.float64)
     pelvis, trunk, left, right = rows[:, :3], rows[:, 3:6], rows[:, 6:9], rows[:, 9:]
     wanted = np.tile(tasks.posed(READY), (len(rows), 1, 1, 1))
     wanted[:, 0] = Rotation.from_euler("xyz", trunk, degrees=True).as_matrix()

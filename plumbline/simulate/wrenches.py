@@ -2,7 +2,8 @@ r"""What plates, handles and a seat measure: reactions on a person that balance 
 
 Statics: :math:`\sum f = m g\,n`, :math:`\sum (p - c) \times f + \tau = 0` about the CoM c; with the acceleration of the CoM
 :math:`\sum f = m (g\,n + \ddot c)`, turning of the segments left out. Hands carry what they are told to; plates share the rest, with the
-smallest forces and moments about their middles, and report it at their centre of pressure.
+smallest forces and moments about their middles, and report it at their centre of pressure; hands on handles help a little, so that
+the centre of pressure stays near the feet.
 
 Source of the projection: Gonzalez et al. (2013), eq. (12), :math:`n \times M_o / (W \cdot n)` with the positive vertical load.
 """
@@ -23,6 +24,7 @@ PLATE = 0.10  # [m] lever that weighs the moments of a plate against its forces
 LOADED = 1.0  # [N] vertical force over which a plate has a centre of pressure
 HAND = (0.005, 0.008, 0.030)  # [1] of the weight a hand carries: amplitude of right, forward; mean and amplitude of up
 UP = np.array([0.0, 0.0, 1.0])
+HELP = 0.10  # [1] readiness of a hand to take force, of a plate's
 GRIP = 0.5  # [N m] free moment of a hand
 
 
@@ -64,7 +66,10 @@ def contacts(time: Array, com: Array, acceleration: Array, mass: float, plates: 
     for hand in hands:
         force = force - hand.force
         moment = moment - np.cross(hand.point - com, hand.force) - hand.moment
-    return _shared(com, force, moment, plates) + hands
+    helping = [Plate(grip.name, grip.point, HELP * grip.load) for grip in grips]
+    shared = _shared(com, force, moment, [*plates, *helping], [PLATE] * len(plates) + [0.0] * len(helping))
+    feet = [_pressed(plate) for plate in shared[: len(plates)]]
+    return feet + [replace(hand, force=hand.force + more.force) for hand, more in zip(hands, shared[len(plates) :], strict=True)]
 
 
 def _hand(grip: Grip, i: int, time: Array, mass: float) -> Contact:
@@ -75,22 +80,22 @@ def _hand(grip: Grip, i: int, time: Array, mass: float) -> Contact:
     return Contact(grip.name, grip.point, force, GRIP * grip.load[:, None] * wave[:, ::-1])
 
 
-def _shared(com: Array, force: Array, moment: Array, plates: Sequence[Plate]) -> list[Contact]:
-    """A force and a moment about the CoM, shared by the plates: least squares in forces and in moments over PLATE."""
+def _shared(com: Array, force: Array, moment: Array, plates: Sequence[Plate], levers: Sequence[float]) -> list[Contact]:
+    """A force and a moment about the CoM, shared: least squares in forces and in moments over a lever [m]; 0: no moments."""
     system = np.zeros((len(com), 6, 6))
-    levers = [_cross(plate.point - com) for plate in plates]
-    for plate, lever in zip(plates, levers, strict=True):
-        back = lever.transpose(0, 2, 1)
-        block = np.block([[np.broadcast_to(np.eye(3), lever.shape), back], [lever, lever @ back + PLATE**2 * np.eye(3)]])
+    arms = [_cross(plate.point - com) for plate in plates]
+    for plate, arm, lever in zip(plates, arms, levers, strict=True):
+        back = arm.transpose(0, 2, 1)
+        block = np.block([[np.broadcast_to(np.eye(3), arm.shape), back], [arm, arm @ back + lever**2 * np.eye(3)]])
         system += plate.share[:, None, None] * block
     weights = np.linalg.solve(system, np.concatenate([force, moment], axis=1)[:, :, None])[:, :, 0]
     out = []
-    for plate, lever in zip(plates, levers, strict=True):
+    for plate, arm, lever in zip(plates, arms, levers, strict=True):
         share = plate.share[:, None]
-        f = share * (weights[:, :3] + np.einsum("nji,nj->ni", lever, weights[:, 3:]))
-        if f[:, 2].min() < -LOADED:
+        f = share * (weights[:, :3] + np.einsum("nji,nj->ni", arm, weights[:, 3:]))
+        if lever and f[:, 2].min() < -LOADED:
             raise Unreachable(f"{plate.name} would have to pull by {-f[:, 2].min():.0f} N")
-        out.append(_pressed(Contact(plate.name, plate.point, f, share * PLATE**2 * weights[:, 3:])))
+        out.append(Contact(plate.name, plate.point, f, share * lever**2 * weights[:, 3:]))
     return out
 
 
