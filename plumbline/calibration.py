@@ -4,82 +4,120 @@ Numerics: ``plumbline/models/sesc.py``; parameters and spreads: ``plumbline/pers
 """
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 from scipy.optimize import brentq
 
 from plumbline.models import sesc as model
 from plumbline.models.sesc import USUAL, Noise, Posterior, Prior, Rows
+from plumbline.moving import EQUATIONS, Equations
 from plumbline.person_com import Columns, Parameter, turned
 from plumbline.still import Window
 
 Array = NDArray[np.float64]
 
+Told = tuple[str, Window]  # a trial, and a still window of it
+
+START = (0.03, 0.03, 0.03, 0.003, 0.003)  # [m/s2], [m] noise of the equations of motion to begin with
+MEMORY = 1.2  # [s] a slow trial of 13 s holds about ten independent blocks
+ROUNDS = 8
 MOST = 600  # windows of one fit; more are thinned evenly: neighbours say the same
-FOLDS, QUARTERS = 8, 4  # groups of trials, or pieces of the only one, that are left out in turn
+FOLDS = 8  # groups of trials that are left out in turn
 COARSEST = 0.02  # [m] floor beyond which the data do not fit a chain at all
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """What still windows say of a person.
+    """What the recordings of a person say of the q parameters.
 
-    posterior: of the parameters.  rows: of the fit, first all x then all y.  constant: what a constant error of the CoP does to
-    them (r, 2).  noise: as used, with the floor that the data needed.  directions: of the segments in the windows (k, s, 3).
+    posterior: of them and of the CoP's constant error (x, y), q + 2.  rows: of the fit.  noise: with the floor that the data needed.
+    sigma: of each of `EQUATIONS` [m/s2], [m]; NaN without moving windows.  directions: of the segments in the still windows (k, s, 3).
     """
 
     posterior: Posterior
     rows: Rows
-    constant: Array
     noise: Noise
+    sigma: Array
     directions: Array
 
+    @property
+    def mean(self) -> Array:
+        """Of the parameters (q,)."""
+        return self.posterior.mean[:-2]
 
-def calibrate(windows: Sequence[tuple[str, Window]], prior: Prior, noise: Noise = USUAL) -> Calibration:
-    """The parameters of a person from windows (trial, window), all of them used.
+    @property
+    def covariance(self) -> Array:
+        """Of the parameters (q, q)."""
+        return self.posterior.covariance[:-2, :-2]
 
-    Where the residual is larger than its noise, the floor is raised until it is not: what no chain follows widens the bands.
+
+def calibrate(windows: Sequence[Told], moving: Sequence[Equations], prior: Prior, noise: Noise = USUAL) -> Calibration:
+    """The parameters of a person from still windows, all of them used, and from equations of motion.
+
+    Where the residual of the still windows is larger than its noise, their floor is raised until it is not: what no chain follows
+    widens the bands. The noise of each equation of motion is what is left of it, found together with the parameters; windows overlap,
+    so that `MEMORY` seconds of them count as one.
     """
-    pick = np.linspace(0, len(windows) - 1, min(len(windows), MOST)).astype(int)
-    chosen = [windows[i] for i in pick.tolist()]
+    chosen = list(windows[:: -(-len(windows) // MOST)]) if windows else []
     directions = np.array([w.directions for _, w in chosen])
+    wide = Prior(np.append(prior.mean, np.zeros(2)), block_diag(prior.covariance, noise.constant**2 * np.eye(2)))
 
-    def solved(floor: float) -> tuple[Posterior, Rows, Array]:
-        rows, constant = _rows(chosen, prior, replace(noise, floor=floor), directions)
-        return model.batch(prior, rows), rows, constant
+    def misfit(floor: float) -> float:
+        return model.batch(wide, _still(chosen, len(prior.mean), replace(noise, floor=floor), directions)).misfit
 
-    floor = noise.floor
-    if chosen and solved(floor)[0].misfit > 1.0:
-        floor = (
-            COARSEST if solved(COARSEST)[0].misfit > 1.0 else float(brentq(lambda f: solved(f)[0].misfit - 1.0, floor, COARSEST, rtol=0.02))
-        )
-    posterior, rows, constant = solved(floor)
-    return Calibration(posterior, rows, constant, replace(noise, floor=floor), directions)
+    if chosen and misfit(noise.floor) > 1.0:
+        floor = COARSEST if misfit(COARSEST) > 1.0 else float(brentq(lambda f: misfit(f) - 1.0, noise.floor, COARSEST, rtol=0.02))
+        noise = replace(noise, floor=floor)
+    rows = _still(chosen, len(prior.mean), noise, directions)
+    return _with_motion(rows, moving, wide, noise, directions)
 
 
-def _rows(chosen: Sequence[tuple[str, Window]], prior: Prior, noise: Noise, directions: Array) -> tuple[Rows, Array]:
-    """Rows of both horizontal axes, decorrelated; and what a constant error of the CoP does to them."""
-    q, k = len(prior.mean), len(chosen)
+def _still(chosen: Sequence[Told], q: int, noise: Noise, directions: Array) -> Rows:
+    """Rows of the still windows, first x then y, decorrelated, with the constant error of the CoP in the last two columns."""
     if not chosen:
-        return Rows(np.zeros((0, q)), np.zeros(0)), np.zeros((0, 2))
+        return Rows(np.zeros((0, q + 2)), np.zeros(0))
     covariance = model.floor_covariance(turned(directions), noise)
-    trials = np.array([trial for trial, _ in chosen])
-    for trial in np.unique(trials):
-        mine = np.flatnonzero(trials == trial)
+    for trial in dict.fromkeys(t for t, _ in chosen):
+        mine = [i for i, (t, _) in enumerate(chosen) if t == trial]
         at, n = np.array([chosen[i][1].middle for i in mine]), chosen[mine[0]][1].samples
         length = float(np.min(np.diff(at))) if len(at) > 1 else 1.0
         covariance[np.ix_(mine, mine)] += model.mean_covariance(at, length, n, noise)
-    axes = []
+    matrix, values = [], []
     for a in (0, 1):
-        h = np.column_stack([np.array([w.basis[a] for _, w in chosen]), np.ones(k)])
-        y = np.array([w.ground[a] - w.table[a] for _, w in chosen])
-        axes.append(model.decorrelated(h, y, covariance))
-    zero = np.zeros(k)
-    constant = np.column_stack([np.concatenate([axes[0].matrix[:, -1], zero]), np.concatenate([zero, axes[1].matrix[:, -1]])])
-    return Rows(np.vstack([r.matrix[:, :-1] for r in axes]), np.concatenate([r.values for r in axes])), constant
+        h = np.column_stack([np.array([w.basis[a] for _, w in chosen]), np.tile(np.eye(2)[a], (len(chosen), 1))])
+        rows = model.decorrelated(h, np.array([w.ground[a] - w.table[a] for _, w in chosen]), covariance)
+        matrix.append(rows.matrix)
+        values.append(rows.values)
+    return Rows(np.vstack(matrix), np.concatenate(values))
+
+
+def _with_motion(still: Rows, moving: Sequence[Equations], prior: Prior, noise: Noise, directions: Array) -> Calibration:
+    """Still rows and equations of motion together; the noise of the latter by expectation and maximisation."""
+    used = [e for e in moving if len(e.time)]
+    sigma = np.array(START) if used else np.full(len(EQUATIONS), np.nan)
+    if not used:
+        return Calibration(model.batch(prior, still), still, noise, sigma, directions)
+    q = len(prior.mean)
+    step = float(
+        np.median(np.concatenate([np.diff(e.time) for e in used if len(e.time) > 1]) if any(len(e.time) > 1 for e in used) else 0.05)
+    )
+    kind = np.concatenate([np.repeat(np.arange(5), len(e.time)) for e in used])
+    matrix = np.zeros((len(kind), q))
+    matrix[:, :-2] = np.concatenate([e.matrix.reshape(-1, q - 2) for e in used])
+    for a in (0, 1):
+        matrix[kind == 3 + a, q - 2 + a] = 1.0
+    values = np.concatenate([e.values.ravel() for e in used])
+    for _ in range(ROUNDS):
+        weight = np.sqrt(step / MEMORY) / sigma[kind]
+        rows = Rows(np.vstack([still.matrix, weight[:, None] * matrix]), np.concatenate([still.values, weight * values]))
+        found = model.batch(prior, rows)
+        left = (values - matrix @ found.mean) ** 2 + np.einsum("ri,ij,rj->r", matrix, found.covariance, matrix)
+        sigma = np.sqrt(np.bincount(kind, left, 5) / np.bincount(kind, minlength=5))
+    return Calibration(found, rows, noise, sigma, directions)
 
 
 # -- a subject --------------------------------------------------------------------------------------------------------
@@ -87,57 +125,61 @@ def _rows(chosen: Sequence[tuple[str, Window]], prior: Prior, noise: Noise, dire
 
 @dataclass(frozen=True)
 class Trial:
-    """A trial of a subject: its key, columns in all frames, and windows."""
+    """A trial of a subject: its key, columns in all frames, still windows and equations of motion."""
 
     key: dict[str, str]
     time: Array
     columns: Columns
     windows: list[Window]
+    motion: Equations
+
+    @property
+    def still(self) -> list[Told]:
+        """Windows that can calibrate."""
+        return [(self.key["trial"], w) for w in self.windows if not w.reason]
+
+    @property
+    def moving(self) -> Equations:
+        """Equations of motion outside of the still windows."""
+        return self.motion.outside([(w.middle - w.length / 2, w.middle + w.length / 2) for _, w in self.still])
 
 
 @dataclass(frozen=True)
 class Person:
-    """A subject's own CoM.  calibration: from all used windows.  heldout: of each used window, its CoM told by the others (3,)."""
+    """A subject's own CoM.
+
+    calibration: from all of its trials that calibrate.  others: trial -> the same without that trial (without its fold, where there are
+    many); the whole one for trials that do not calibrate.
+    """
 
     subject: str
     trials: list[Trial]
     parameters: tuple[Parameter, ...]
     calibration: Calibration
-    heldout: dict[tuple[str, float], Array]
-
-    def com(self, c: Columns) -> tuple[Array, Array]:
-        """CoM and its predicted sd in the frames of a trial [m], each (n, 3); what no chain follows is in the sd."""
-        p = self.calibration.posterior
-        sd = np.hypot(model.spread(c.basis, p.covariance), self.calibration.noise.floor)
-        return np.asarray(c.table + c.basis @ p.mean), np.asarray(sd)
+    others: dict[str, Calibration]
 
 
-def person(subject: str, trials: Sequence[Trial], wanted: Sequence[str], times: float, noise: Noise = USUAL) -> Person | None:
+def person(
+    subject: str, trials: Sequence[Trial], wanted: Sequence[str], times: float, motion: bool = True, noise: Noise = USUAL
+) -> Person | None:
     """The own CoM of one subject; None where no trial has a CoM from markers.
 
-    wanted: tasks or trials whose still windows calibrate; empty: all.  times: the prior's spread over the published one [1].
-    Trials in which other segments are seen than in most do not calibrate: their parameters mean something else.
+    wanted: tasks or trials that calibrate; empty: all.  times: the prior's spread over the published one [1].  motion: whether moving
+    windows calibrate too. Trials in which other segments are seen than in most do not calibrate: their parameters mean something else.
     """
-    by_set = Counter(tuple(p.name for p in t.columns.parameters) for t in trials if len(t.columns.parameters))
+    by_set = Counter(tuple(p.name for p in t.columns.parameters) for t in trials)
     if not by_set:
         return None
     usual = by_set.most_common(1)[0][0]
     alike = [t for t in trials if tuple(p.name for p in t.columns.parameters) == usual]
     used = [t for t in alike if not wanted or {t.key["trial"], t.key["task"]} & set(wanted)]
-    windows = [(t.key["trial"], w) for t in used for w in t.windows if not w.reason]
     prior = alike[0].columns.prior(times)
-    whole = calibrate(windows, prior, noise)
-    return Person(subject, alike, alike[0].columns.parameters, whole, dict(_heldout(windows, prior, whole.noise)))
 
+    def told(some: Sequence[Trial], noise: Noise) -> Calibration:
+        return calibrate([w for t in some for w in t.still], [t.moving for t in some] if motion else [], prior, noise)
 
-def _heldout(windows: Sequence[tuple[str, Window]], prior: Prior, noise: Noise) -> Iterator[tuple[tuple[str, float], Array]]:
-    """CoM of each window told by windows of other trials (of other quarters of it where there is but one), by trial and time."""
-    trials = sorted({trial for trial, _ in windows})
-    fold = {trial: i % FOLDS for i, trial in enumerate(trials)}
-    group = [fold[trial] if len(trials) > 1 else QUARTERS * i // len(windows) for i, (trial, _) in enumerate(windows)]
-    for g in sorted(set(group)):
-        rest = [w for w, k in zip(windows, group, strict=True) if k != g]
-        mean = calibrate(rest, prior, noise).posterior.mean if rest else prior.mean
-        for (trial, w), k in zip(windows, group, strict=True):
-            if k == g:
-                yield (trial, w.middle), w.table + w.basis @ mean
+    whole = told(used, noise)
+    fold = {t.key["trial"]: i % FOLDS for i, t in enumerate(used)}
+    without = {k: told([t for t in used if fold[t.key["trial"]] != k], noise) for k in set(fold.values())}
+    others = {t.key["trial"]: without.get(fold.get(t.key["trial"], -1), whole) for t in alike}
+    return Person(subject, alike, alike[0].columns.parameters, whole, others)

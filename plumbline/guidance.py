@@ -12,11 +12,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from plumbline.models.sesc import Prior, spread
+from plumbline.models.sesc import spread
 
 Array = NDArray[np.float64]
 
-LEARNT = 0.5  # [1] of the prior's sd: above, what is said of an axis is the prior's
+LEARNT = 0.5  # [1] of the prior's sd: above, what is said of the vertical is the prior's
 
 
 class Step(NamedTuple):
@@ -31,20 +31,21 @@ def mean_spread(basis: Array, covariance: Array) -> Array:
     return np.asarray(np.sqrt(np.mean(spread(basis, covariance) ** 2, axis=0)))
 
 
-def observable(rows: Array, prior: Prior, constants: Array, motion: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Share of the prior's sd that is left per axis (3,) if the CoP may be off by any constant; and which axes are observable (3,).
+def vertical(rows: Array, prior: Array, motion: Array) -> float:
+    """Share of the prior's vertical sd over a motion that is left if the CoP may be off by any constant [1].
 
-    rows: whitened horizontal rows (r, q).  constants: what a constant error of the CoP does to them (r, 2).  motion: basis of the
-    intended motion (n, 3, q).
+    rows: whitened rows (r, q + 2), the constant error of the CoP in the last two columns.  prior: covariance of the parameters (q, q).
+    motion: basis of the intended motion (n, 3, q).
     """
-    project, _ = np.linalg.qr(constants)
-    free = rows - project @ (project.T @ rows)
-    left = mean_spread(motion, after(prior.covariance, free)) / mean_spread(motion, prior.covariance)
-    return np.asarray(left), np.asarray(left < LEARNT)
+    project, _ = np.linalg.qr(rows[:, -2:])
+    free = rows[:, :-2] - project @ (project.T @ rows[:, :-2])
+    return float(mean_spread(motion, after(prior, free))[2] / mean_spread(motion, prior)[2])
 
 
 def after(covariance: Array, rows: Array) -> Array:
     """Covariance after rows with unit noise.  covariance: (q, q).  rows: (r, q)."""
+    if len(rows) > len(covariance):  # as many equations as unknowns say the same
+        rows = np.linalg.qr(rows, mode="r")
     ph = covariance @ rows.T
     return np.asarray(covariance - ph @ np.linalg.solve(rows @ ph + np.eye(len(rows)), ph.T))
 

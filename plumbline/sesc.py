@@ -15,11 +15,12 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from plumbline import body, contact, forces, guidance, support
-from plumbline.calibration import Person, Trial, person
+from plumbline.calibration import Calibration, Person, Trial, person
 from plumbline.filters import known
 from plumbline.markerset import MarkerSet, choose
-from plumbline.models.sesc import Noise, mean_covariance
-from plumbline.person_com import columns
+from plumbline.models.sesc import Noise, mean_covariance, spread
+from plumbline.moving import equations
+from plumbline.person_com import Columns, columns
 from plumbline.poses import POSES, posed
 from plumbline.signals import Recording
 from plumbline.still import Gate, windows
@@ -37,13 +38,13 @@ UPRIGHT = 0.9  # [1] cosine of a leg's angle with the vertical, from which on a 
 
 def of_part(
     recordings: Iterable[Recording], people: Mapping[str, Participant], markers: str, *, masses: Mapping[str, float],
-    tasks: Sequence[str], window: float, limit: float, sides: str, prior: float,
+    tasks: Sequence[str], motion: bool, window: float, limit: float, sides: str, prior: float,
 ) -> dict[str, pd.DataFrame]:  # fmt: skip
     """Tables `sesc`, `chain`, `poses`, `guidance` of whole subjects, by name.
 
-    people, markers, masses: as in :func:`plumbline.signals.of_part`.  tasks: tasks or trials that calibrate, empty: all.  window: length of
-    a still window [s].  limit: by how much motion may move the ZMP off the CoM [m].  sides: free or tied.  prior: the spread of people
-    over the published one [1].
+    people, markers, masses: as in :func:`plumbline.signals.of_part`.  tasks: tasks or trials that calibrate, empty: all.  motion: whether
+    moving windows do too.  window: length of a still window [s].  limit: by how much motion may move the ZMP off the CoM [m].
+    sides: free or tied.  prior: the spread of people over the published one [1].
     """
     tables: dict[str, list[pd.DataFrame]] = {name: [] for name in ("sesc", "chain", "poses", "guidance")}
     gate = Gate(window, limit)
@@ -51,7 +52,7 @@ def of_part(
         who = people.get(subject, Participant(subject))
         found = [_trial(r, choose(markers, r.markers), who, masses.get(subject, math.nan), gate, sides == "tied") for r in group]
         trials = [t for t, _ in found if t is not None]
-        one = person(subject, trials, tasks, prior)
+        one = person(subject, trials, tasks, prior, motion)
         if one is None:
             continue
         standing = next((b for t, b in found if t is not None and b is not None), None)
@@ -73,10 +74,12 @@ def _trial(
         return None, None
     standing = contact.of_feet(r.markers, support.feet(r.markers, markerset), r.time)
     weight = mass if np.isfinite(mass) else r.mass
-    made, found = windows(frame, forces.net(r.plates, r.time, standing), r.time, weight, gate, tied)
+    force = forces.net(r.plates, r.time, standing)
+    made, found = windows(frame, force, r.time, weight, gate, tied)
+    moving = equations(made, force, frame.angular_momentum(r.time, weight), r.time, r.mass if np.isfinite(r.mass) else weight)
     t = r.trial
     key = {"trial": t.trial, "subject": t.subject, "task": t.task, "condition": t.condition}
-    return Trial(key, r.time, made, found), _upright(frame)
+    return Trial(key, r.time, made, found, moving), _upright(frame)
 
 
 def _upright(frame: body.Body) -> body.Body | None:
@@ -95,23 +98,32 @@ def _upright(frame: body.Body) -> body.Body | None:
 # -- rows -------------------------------------------------------------------------------------------------------------
 
 
+def told(cal: Calibration, c: Columns) -> tuple[Array, Array]:
+    """CoM and its predicted sd in the frames of a trial [m], each (n, 3), with what no chain follows; NaN where nothing calibrates."""
+    sd = np.hypot(spread(c.basis, cal.covariance), cal.noise.floor)
+    return np.asarray(c.table + c.basis @ cal.mean) if cal.posterior.rows else np.full_like(c.table, np.nan), np.asarray(sd)
+
+
 def _frames(one: Person, t: Trial) -> pd.DataFrame:
-    com, sd = one.com(t.columns)
     used = one.calibration.directions
+    com, sd = told(one.calibration, t.columns)
+    by_others, _ = told(one.others[t.key["trial"]], t.columns)
     out = guidance.outside(t.columns.directions, used, REACH) if len(used) else np.ones(len(com), dtype=bool)
-    if not one.calibration.posterior.rows:
-        com = np.full_like(com, np.nan)  # nothing was learnt: there is only the table
-    xyz = {f"com_sesc_{a}": com[:, i] for i, a in enumerate("xyz")} | {f"com_sesc_sd_{a}": sd[:, i] for i, a in enumerate("xyz")}
+    xyz = {
+        f"{name}_{a}": v[:, i]
+        for name, v in (("com_sesc", com), ("com_sesc_sd", sd), ("com_others", by_others))
+        for i, a in enumerate("xyz")
+    }
     return pd.DataFrame({**t.key, "frame": np.arange(len(com)), **xyz, "outside": out})
 
 
 def _chain(one: Person) -> pd.DataFrame:
-    p = one.calibration.posterior
-    before, after = np.sqrt(np.diag(p.prior.covariance)), np.sqrt(np.diag(p.covariance))
+    c = one.calibration
+    before, after = np.sqrt(np.diag(c.posterior.prior.covariance))[:-2], np.sqrt(np.diag(c.covariance))
     return pd.DataFrame(
         {
             "subject": one.subject, "parameter": [x.name for x in one.parameters], "unit": [x.unit for x in one.parameters],
-            "value": p.mean, "sd": after, "prior_sd": before, "learnt": 1.0 - after / before,
+            "value": c.mean, "sd": after, "prior_sd": before, "learnt": 1.0 - after / before,
         }
     )  # fmt: skip
 
@@ -124,8 +136,8 @@ def _poses(one: Person, trials: Sequence[Trial], tasks: Sequence[str]) -> pd.Dat
         for w in t.windows:
             reason = w.reason or ("" if chosen else "not among sesc.tasks")
             reason = reason if t.key["trial"] in alike else "other segments are seen than in the subject's other trials"
-            told = one.heldout.get((t.key["trial"], w.middle), np.full(3, np.nan))
-            off, table = told[:2] - w.ground, w.table[:2] - w.ground
+            by_others = w.table + w.basis @ one.others[t.key["trial"]].mean if t.key["trial"] in alike else np.full(3, np.nan)
+            off, table = by_others[:2] - w.ground, w.table[:2] - w.ground
             rows.append(
                 t.key | {
                     "time": w.middle, "used": not reason, "reason": reason, "load": w.load, "shift": w.shift,
@@ -142,12 +154,14 @@ def _guidance(one: Person, standing: body.Body | None) -> dict[str, Any]:
     p, noise = c.posterior, c.noise
     motion = np.concatenate([t.columns.basis[known(t.columns.table)] for t in one.trials])
     motion = motion[np.unique(np.linspace(0, len(motion) - 1, FRAMES).astype(int))]
-    before, now = guidance.mean_spread(motion, p.prior.covariance), np.hypot(guidance.mean_spread(motion, p.covariance), noise.floor)
-    left, seen = guidance.observable(c.rows.matrix, p.prior, c.constant, motion) if p.rows else (np.ones(3), np.zeros(3, dtype=bool))
+    prior = p.prior.covariance[:-2, :-2]
+    before, now = guidance.mean_spread(motion, prior), np.hypot(guidance.mean_spread(motion, c.covariance), noise.floor)
+    left = guidance.vertical(c.rows.matrix, prior, motion) if p.rows else 1.0
     steps = list(_next(p.covariance, motion, standing, noise)) if standing is not None else []
-    out: dict[str, Any] = {"subject": one.subject, "windows": p.rows // 2, "misfit": p.misfit, "floor": noise.floor}
+    out: dict[str, Any] = {"subject": one.subject, "windows": len(c.directions), "misfit": p.misfit, "floor": noise.floor}
     for i, a in enumerate("xyz"):
-        out |= {f"table_sd_{a}": before[i], f"sd_{a}": now[i], f"left_{a}": left[i], f"observable_{a}": bool(seen[i])}
+        out |= {f"table_sd_{a}": before[i], f"sd_{a}": now[i]}
+    out |= {"vertical_left": left, "vertical_observable": left < guidance.LEARNT}
     gains = [float(g) for g in p.gains if g > 0.01]
     out |= {"learnt": int(np.sum(p.gains > 1.0)), "parameters": len(p.mean), "gains": json.dumps([round(g, 2) for g in gains])}
     out |= {"next": json.dumps([{"pose": s.pose, "sd": [round(float(v), 5) for v in s.sd]} for s in steps])}
@@ -155,13 +169,10 @@ def _guidance(one: Person, standing: body.Body | None) -> dict[str, Any]:
 
 
 def _next(covariance: Array, motion: Array, standing: body.Body, noise: Noise) -> Iterator[guidance.Step]:
-    """The poses to record next, each held for `HOLD`; a constant error of the CoP is one unknown that all of them share."""
-    q = len(covariance)
-    wider = np.zeros((q + 2, q + 2))
-    wider[:q, :q], wider[q:, q:] = covariance, noise.constant**2 * np.eye(2)
+    """The poses to record next, each held for `HOLD`.  covariance: of the parameters and the CoP's constant error (q + 2, q + 2)."""
     candidates = {name: np.hstack([columns(posed(standing, name)).basis[0, :2], np.eye(2)]) for name in POSES}
     padded = np.concatenate([motion, np.zeros((len(motion), 3, 2))], axis=2)
-    yield from guidance.next_poses(wider, padded, candidates, hold_sd(noise), NEXT)
+    yield from guidance.next_poses(covariance, padded, candidates, hold_sd(noise), NEXT)
 
 
 def hold_sd(noise: Noise, seconds: float = HOLD, rate: float = 100.0) -> float:

@@ -31,7 +31,7 @@ from plumbline.tables import TABLES, joined
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-METHODS = ("table", "lab", "force", "sesc", "fused")
+METHODS = ("table", "lab", "force", "sesc", "others", "fused")
 LAB_COM = ("centreofmass", "centerofmass", "com", "cog", "wholebodycom", "centreofgravity", "centerofgravity")
 
 
@@ -61,18 +61,19 @@ class Signals(NamedTuple):
 
 def signals(
     recording: Recording, participant: Participant, markerset: MarkerSet | None, *, cutoff: float, subject_mass: float = math.nan,
-    own: Array | None = None,
+    own: tuple[Array, Array] | None = None,
 ) -> Signals:  # fmt: skip
     """Signals of one trial.
 
     markerset: None where no set fits; then there is no table CoM.  cutoff: [Hz], -3 dB after the double pass.
     subject_mass: [kg], what the plates say in the subject's other trials; used where this trial does not tell it, before
-    participants.tsv.  own: the subject's own CoM [m], (n, 3).  Raises Refused ("no_rate") where the frames are too slow for the cut-off.
+    participants.tsv.  own: the subject's own CoM, by all its trials and by
+    the others [m], each (n, 3).  Raises Refused ("no_rate") where the frames are too slow for the cut-off.
     """
     notes: list[str] = list(markerset.notes) if markerset else []
     made = _made(recording, participant, markerset, subject_mass, notes)
     if own is not None:
-        made.coms["sesc"] = own
+        made.coms["sesc"], made.coms["others"] = own
     columns = _columns(recording, markerset, made, cutoff)
     coverage = _coverage(recording, markerset, made, cutoff, notes)
     return Signals(pd.DataFrame({c.name: columns[c.name] for c in TABLES["signals"]}), coverage, notes)
@@ -99,7 +100,7 @@ def _made(recording: Recording, participant: Participant, markerset: MarkerSet |
     notes += force.notes + (frame.notes if frame else [])
     coms = {"table": frame.com() if frame else nothing, "lab": _lab(recording)}
     height = _height(coms, force, participant, notes)
-    coms |= {"force": com_from_force(force.grf, force.zmp, time, mass, height), "none": nothing, "sesc": nothing}
+    coms |= {"force": com_from_force(force.grf, force.zmp, time, mass, height), "none": nothing, "sesc": nothing, "others": nothing}
     coms["fused"] = fused(coms["table"], force.grf, time, mass)
     method = next((m for m in ("table", "lab", "force") if filters.known(coms[m]).any()), "none")
     border = support.limits(outline, markerset, standing, force, recording.plates)
@@ -267,13 +268,13 @@ def _limitations(recording: Recording, frame: body.Body | None, force: Forces, m
 
 def of_part(
     recordings: Iterable[Recording], people: Mapping[str, Participant], markers: str, *, cutoff: float, masses: Mapping[str, float],
-    own: Callable[[str], Array | None] = lambda trial: None,
+    own: Callable[[str], tuple[Array, Array] | None] = lambda trial: None,
 ) -> tuple[pd.DataFrame, pd.DataFrame]:  # fmt: skip
     """Tables `signals` and `coverage` of whole subjects.
 
     people: rows of participants.tsv by subject.  markers: path of a markerset.yaml, the name of a built-in set, or "auto".  masses:
-    from `subject_masses`.
-    own: trial -> the subject's own CoM [m], (n, 3), None where there is none.  A trial that is too slow for the cut-off has a row in `coverage` that says so, and no signals.
+    from `subject_masses`.  own: trial -> the subject's own CoM, by all its trials and by the others [m], each (n, 3), None
+    where there is none.  A trial that is too slow for the cut-off has a row in `coverage` that says so, and no signals.
     """
     frames, rows = [], []
     for recording in recordings:
@@ -296,12 +297,16 @@ def subject_masses(trials: pd.DataFrame) -> dict[str, float]:
     return {str(s): float(m) for s, m in trials.groupby("subject")["mass"].median().items()}
 
 
-def own_com(rows_of: Callable[[str], pd.DataFrame]) -> Callable[[str], Array | None]:
-    """Trial -> the subject's own CoM [m], (n, 3); None where there is none.  rows_of: trial -> its rows of table `sesc`."""
+def own_com(rows_of: Callable[[str], pd.DataFrame]) -> Callable[[str], tuple[Array, Array] | None]:
+    """Trial -> the subject's own CoM, by all its trials and by the others [m], each (n, 3); None where there is none.
 
-    def of(trial: str) -> Array | None:
+    rows_of: trial -> its rows of table `sesc`.
+    """
+
+    def of(trial: str) -> tuple[Array, Array] | None:
         rows = rows_of(trial)
-        return rows[[f"com_sesc_{a}" for a in "xyz"]].to_numpy() if len(rows) else None
+        one, two = (rows[[f"{name}_{a}" for a in "xyz"]].to_numpy() for name in ("com_sesc", "com_others"))
+        return (one, two) if len(rows) else None
 
     return of
 

@@ -38,11 +38,12 @@ class Gate(NamedTuple):
 class Window:
     """One window of a trial; vectors are means over it.
 
-    start, middle [s].  samples: frames in it.  reason: empty where it is used.  load: of body weight [1].  shift: z F_h / F_z [m].
+    middle, length [s].  samples: frames in it.  reason: empty where it is used.  load: of body weight [1].  shift: z F_h / F_z [m].
     ground: measured projection [m] (2,).  table: CoM of the segment table [m] (3,).  basis (3, q).  directions (s, 3).
     """
 
     middle: float
+    length: float
     samples: int
     reason: str
     load: float
@@ -73,7 +74,7 @@ def _windows(c: Columns, force: Forces, time: Array, mass: float, gate: Gate) ->
             height = float(np.mean(c.table[w, 2])) - force.surface
             shift = float(np.linalg.norm(lean) * height)
         yield Window(
-            float(np.mean(time[w])), n, _reason(c.table[w], force.zmp[w], load, shift, step, height, gate), load, shift,
+            float(np.mean(time[w])), n * step, n, _reason(c.table[w], force.zmp[w], load, shift, step, height, gate), load, shift,
             force.zmp[w, :2].mean(axis=0), c.table[w].mean(axis=0), c.basis[w].mean(axis=0), c.directions[w].mean(axis=0),
         )  # fmt: skip
 

@@ -86,6 +86,7 @@ TABLES: dict[str, list[Column]] = {
         _c("frame", "int", "", "from 0 within the trial"),
         *_xyz("com_sesc", "m", "the subject's own CoM; NaN where no still window could be used"),
         *_xyz("com_sesc_sd", "m", "its predicted standard deviation"),
+        *_xyz("com_others", "m", "the same told by the subject's other trials alone: what a comparison may use"),
         _c("outside", "bool", "", "a segment points further than 0.35 rad from where it pointed in any calibration pose"),
     ],
     "chain": [
@@ -116,16 +117,10 @@ TABLES: dict[str, list[Column]] = {
         _c("windows", "int", "", "still windows behind the calibration"),
         _c("misfit", "float", "1", "mean square of what is left of them, over what their noise says"),
         _c("floor", "float", "m", "what no chain follows, raised until the misfit is one"),
-        *[
-            _c(f"{name}_{a}", "bool" if name == "observable" else "float", unit, f"{text}, {w}")
-            for a, w in zip("xyz", ("right", "forward", "up"), strict=True)
-            for name, unit, text in (
-                ("table_sd", "m", "predicted error of the table's CoM over what the subject does"),
-                ("sd", "m", "predicted error of the own CoM"),
-                ("left", "1", "share of the first that is left if the CoP may be off by any constant"),
-                ("observable", "", "that share is below one half"),
-            )
-        ],
+        *_xyz("table_sd", "m", "predicted error of the table's CoM over what the subject does"),
+        *_xyz("sd", "m", "predicted error of the own CoM"),
+        _c("vertical_left", "float", "1", "share of the table's vertical error that is left if the CoP may be off by any constant"),
+        _c("vertical_observable", "bool", "", "that share is below one half"),
         _c("learnt", "int", "", "directions that the poses tell better than the table does"),
         _c("parameters", "int", "", "parameters of the chain"),
         _c("gains", "str", "", "how many times stronger than the prior the poses speak along each direction, JSON list"),
@@ -140,7 +135,8 @@ TABLES: dict[str, list[Column]] = {
         *_xyz("com_table", "m", "CoM from the segment table, unfiltered"),
         *_xyz("com_force", "m", "CoM by double integration of the force (band-limited; mean from the CoP)"),
         *_xyz("com_lab", "m", "CoM as the file itself holds it"),
-        *_xyz("com_sesc", "m", "the subject's own CoM from still poses (`sesc`)"),
+        *_xyz("com_sesc", "m", "the subject's own CoM (`sesc`)"),
+        *_xyz("com_others", "m", "the same told by the subject's other trials alone: what a comparison may use"),
         *_xyz("com_fused", "m", "CoM of the table held together with the force: above 0.3 Hz the force decides"),
         *_xyz("grf", "N", "net ground reaction, unfiltered"),
         *_xyz("zmp", "m", "net centre of pressure in the ground plane, unfiltered"),
