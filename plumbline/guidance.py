@@ -45,7 +45,7 @@ def vertical(rows: Array, prior: Array, motion: Array) -> float:
 def after(covariance: Array, rows: Array) -> Array:
     """Covariance after rows with unit noise.  covariance: (q, q).  rows: (r, q)."""
     if len(rows) > len(covariance):  # as many equations as unknowns say the same
-        rows = np.linalg.qr(rows, mode="r")
+        rows = np.asarray(np.linalg.qr(rows, mode="r"))
     ph = covariance @ rows.T
     return np.asarray(covariance - ph @ np.linalg.solve(rows @ ph + np.eye(len(rows)), ph.T))
 
