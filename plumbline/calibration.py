@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
-from scipy.optimize import brentq
 
 from plumbline.models import sesc as model
 from plumbline.models.sesc import USUAL, Noise, Posterior, Prior, Rows
@@ -27,7 +26,8 @@ MEMORY = 1.2  # [s] a slow trial of 13 s holds about ten independent blocks
 ROUNDS = 8
 MOST = 600  # windows of one fit; more are thinned evenly: neighbours say the same
 FOLDS = 8  # groups of trials that are left out in turn
-COARSEST = 0.02  # [m] floor beyond which the data do not fit a chain at all
+POOR = 1.2  # [1] misfit of still windows, from which on their noise is looked for
+LOUDER, RAISED = (1.0, 1.6, 2.5, 4.0, 6.3), (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # [1] times the usual noise, the usual floor
 
 
 @dataclass(frozen=True)
@@ -58,20 +58,22 @@ class Calibration:
 def calibrate(windows: Sequence[Told], moving: Sequence[Equations], prior: Prior, noise: Noise = USUAL) -> Calibration:
     """The parameters of a person from still windows, all of them used, and from equations of motion.
 
-    Where the residual of the still windows is larger than its noise, their floor is raised until it is not: what no chain follows
-    widens the bands. The noise of each equation of motion is what is left of it, found together with the parameters; windows overlap,
-    so that `MEMORY` seconds of them count as one.
+    Where the residual of the still windows is larger than its noise, the noise is what makes them most likely: more of what no chain
+    follows, or more of everything, widens the bands. The noise of each equation of motion is what is left of it, found together with
+    the parameters; windows overlap, so that `MEMORY` seconds of them count as one.
     """
     chosen = list(windows[:: -(-len(windows) // MOST)]) if windows else []
     directions = np.array([w.directions for _, w in chosen])
     wide = Prior(np.append(prior.mean, np.zeros(2)), block_diag(prior.covariance, noise.constant**2 * np.eye(2)))
 
-    def misfit(floor: float) -> float:
-        return model.batch(wide, _still(chosen, len(prior.mean), replace(noise, floor=floor), directions)).misfit
+    def told(noise: Noise) -> Posterior:
+        return model.batch(wide, _still(chosen, len(prior.mean), noise, directions))
 
-    if chosen and misfit(noise.floor) > 1.0:
-        floor = COARSEST if misfit(COARSEST) > 1.0 else float(brentq(lambda f: misfit(f) - 1.0, noise.floor, COARSEST, rtol=0.02))
-        noise = replace(noise, floor=floor)
+    if chosen and told(noise).misfit > POOR:
+        louder = [
+            replace(noise, white=noise.white * k, slow=noise.slow * k, floor=f) for k in LOUDER for f in noise.floor * np.array(RAISED)
+        ]
+        noise = max(louder, key=lambda n: told(n).evidence)
     rows = _still(chosen, len(prior.mean), noise, directions)
     return _with_motion(rows, moving, wide, noise, directions)
 
@@ -86,13 +88,14 @@ def _still(chosen: Sequence[Told], q: int, noise: Noise, directions: Array) -> R
         at, n = np.array([chosen[i][1].middle for i in mine]), chosen[mine[0]][1].samples
         length = float(np.min(np.diff(at))) if len(at) > 1 else 1.0
         covariance[np.ix_(mine, mine)] += model.mean_covariance(at, length, n, noise)
-    matrix, values = [], []
+    matrix, values, unit = [], [], 0.0
     for a in (0, 1):
         h = np.column_stack([np.array([w.basis[a] for _, w in chosen]), np.tile(np.eye(2)[a], (len(chosen), 1))])
         rows = model.decorrelated(h, np.array([w.ground[a] - w.table[a] for _, w in chosen]), covariance)
         matrix.append(rows.matrix)
         values.append(rows.values)
-    return Rows(np.vstack(matrix), np.concatenate(values))
+        unit += rows.unit
+    return Rows(np.vstack(matrix), np.concatenate(values), unit)
 
 
 def _with_motion(still: Rows, moving: Sequence[Equations], prior: Prior, noise: Noise, directions: Array) -> Calibration:

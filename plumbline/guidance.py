@@ -2,8 +2,8 @@ r"""What a set of poses can and cannot tell of a personal CoM, and which pose to
 
 Poses with feet and hands in the same places leave a direction :math:`v` with :math:`B v` constant: both ends of the body stay where
 they are, so a heavier leg against a lighter arm shifts the CoM by the same vector in all of them. The vector is mostly vertical;
-its small horizontal part is all that the plates see of it, so a constant error of the CoP of 1 mm becomes one of about 3 mm upwards.
-The vertical is therefore called observable only if it is known *without* trusting the CoP to that constant.
+its small horizontal part is all that the plates see of it, so a constant error of the CoP of 1 mm becomes one of about 3 mm upwards,
+and what is known of the vertical is what was known of people before. It is called observable only if it is known without both.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,7 +16,8 @@ from plumbline.models.sesc import spread
 
 Array = NDArray[np.float64]
 
-LEARNT = 0.5  # [1] of the prior's sd: above, what is said of the vertical is the prior's
+WIDER = 4.0  # [1] times the spread of people
+RESTS = 2.0  # [1] above, what is said of the vertical is the prior's
 
 
 class Step(NamedTuple):
@@ -31,15 +32,17 @@ def mean_spread(basis: Array, covariance: Array) -> Array:
     return np.asarray(np.sqrt(np.mean(spread(basis, covariance) ** 2, axis=0)))
 
 
-def vertical(rows: Array, prior: Array, motion: Array) -> float:
-    """Share of the prior's vertical sd over a motion that is left if the CoP may be off by any constant [1].
+def rests_on_prior(rows: Array, prior: Array, motion: Array) -> float:
+    """How many times the predicted vertical error grows if people may differ `WIDER` times as much [1].
 
-    rows: whitened rows (r, q + 2), the constant error of the CoP in the last two columns.  prior: covariance of the parameters (q, q).
-    motion: basis of the intended motion (n, 3, q).
+    1: the poses decide; `WIDER`: the prior.
+
+    rows: whitened rows (r, q + 2), the constant error of the CoP, which nothing is trusted of here, in the last two columns.
+    prior: covariance of the parameters (q, q).  motion: basis of the intended motion (n, 3, q).
     """
     project, _ = np.linalg.qr(rows[:, -2:])
     free = rows[:, :-2] - project @ (project.T @ rows[:, :-2])
-    return float(mean_spread(motion, after(prior, free))[2] / mean_spread(motion, prior)[2])
+    return float(mean_spread(motion, after(WIDER**2 * prior, free))[2] / mean_spread(motion, after(prior, free))[2])
 
 
 def after(covariance: Array, rows: Array) -> Array:

@@ -80,7 +80,7 @@ def _sense(turn: Turn, members: list[int], names: list[str]) -> float:
     if turn.about == "lateral":
         return turn.degrees if hangs else -turn.degrees
     left = hangs and names[members[0]].endswith("_left")
-    return turn.degrees if left else -turn.degrees
+    return -turn.degrees if left else turn.degrees
 
 
 def _groups(names: list[str], p: Array, turn: Turn) -> list[tuple[list[int], Array]]:

@@ -140,7 +140,7 @@ def _poses(one: Person, trials: Sequence[Trial], tasks: Sequence[str]) -> pd.Dat
             off, table = by_others[:2] - w.ground, w.table[:2] - w.ground
             rows.append(
                 t.key | {
-                    "time": w.middle, "used": not reason, "reason": reason, "load": w.load, "shift": w.shift,
+                    "time": w.middle, "length": w.length, "used": not reason, "reason": reason, "load": w.load, "shift": w.shift,
                     "ground_x": w.ground[0], "ground_y": w.ground[1], "table_error_x": table[0], "table_error_y": table[1],
                     "sesc_error_x": off[0], "sesc_error_y": off[1],
                 }
@@ -156,12 +156,12 @@ def _guidance(one: Person, standing: body.Body | None) -> dict[str, Any]:
     motion = motion[np.unique(np.linspace(0, len(motion) - 1, FRAMES).astype(int))]
     prior = p.prior.covariance[:-2, :-2]
     before, now = guidance.mean_spread(motion, prior), np.hypot(guidance.mean_spread(motion, c.covariance), noise.floor)
-    left = guidance.vertical(c.rows.matrix, prior, motion) if p.rows else 1.0
+    rests = guidance.rests_on_prior(c.rows.matrix, prior, motion) if p.rows else guidance.WIDER
     steps = list(_next(p.covariance, motion, standing, noise)) if standing is not None else []
     out: dict[str, Any] = {"subject": one.subject, "windows": len(c.directions), "misfit": p.misfit, "floor": noise.floor}
     for i, a in enumerate("xyz"):
         out |= {f"table_sd_{a}": before[i], f"sd_{a}": now[i]}
-    out |= {"vertical_left": left, "vertical_observable": left < guidance.LEARNT}
+    out |= {"vertical_rests": rests, "vertical_observable": rests < guidance.RESTS}
     gains = [float(g) for g in p.gains if g > 0.01]
     out |= {"learnt": int(np.sum(p.gains > 1.0)), "parameters": len(p.mean), "gains": json.dumps([round(g, 2) for g in gains])}
     out |= {"next": json.dumps([{"pose": s.pose, "sd": [round(float(v), 5) for v in s.sd]} for s in steps])}

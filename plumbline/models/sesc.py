@@ -36,10 +36,14 @@ class Prior(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """Measurements, decorrelated and in units of their noise: matrix (r, q), values (r,), in the order of time."""
+    """Measurements, decorrelated and in units of their noise: matrix (r, q), values (r,), in the order of time.
+
+    unit: log of the determinant of what they were divided by.
+    """
 
     matrix: Array
     values: Array
+    unit: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -68,7 +72,8 @@ class Posterior:
 
     mean (q,), covariance (q, q).  prior: before.  gains: (q,), falling, how many times stronger than the prior the data speak along
     each of `directions` (q, q), columns, in units of the parameters.  misfit: mean square of the residual in units of its noise [1].
-    rows: number of measurements.
+    rows: number of measurements.  evidence: log likelihood of the measurements, the parameters averaged over the prior, but for a
+    constant.
     """
 
     mean: Array
@@ -78,6 +83,7 @@ class Posterior:
     directions: Array
     misfit: float
     rows: int
+    evidence: float
 
     @property
     def relative_error(self) -> Array:
@@ -120,7 +126,7 @@ def decorrelated(matrix: Array, values: Array, covariance: Array) -> Rows:
     except np.linalg.LinAlgError as error:
         raise PlumblineError("the noise of the ground projections is not positive definite: a window given twice?") from error
     both = solve_triangular(lower, np.column_stack([matrix, values]), lower=True)
-    return Rows(both[:, :-1], both[:, -1])
+    return Rows(both[:, :-1], both[:, -1], float(np.sum(np.log(np.diag(lower)))))
 
 
 def batch(prior: Prior, rows: Rows) -> Posterior:
@@ -135,7 +141,10 @@ def batch(prior: Prior, rows: Rows) -> Posterior:
     directions = scale @ back
     covariance = (directions / (1.0 + information)) @ directions.T
     misfit = float(np.mean((left - design @ z) ** 2)) if len(left) else float("nan")
-    return Posterior(prior.mean + scale @ z, covariance, prior, np.sqrt(information), directions, misfit, len(left))
+    loss = float(np.sum((left - design @ z) ** 2) + z @ z + np.sum(np.log1p(information)))
+    return Posterior(
+        prior.mean + scale @ z, covariance, prior, np.sqrt(information), directions, misfit, len(left), -0.5 * loss - rows.unit
+    )
 
 
 def _root(covariance: Array) -> Array:

@@ -1,0 +1,95 @@
+r"""The CoM methods side by side, ranked per subject by what they must obey: Newton in motion, the gravity line at rest.
+
+In motion :math:`r = m\ddot x - F_x` (and the same forward and up) in the weak form; at rest the distance from the ground projection of
+still windows. A subject's own CoM (``sesc``) is judged as its *other* trials tell it. Methods made from the force obey it by
+construction: their residual is shown, and not ranked.
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from plumbline.filters import known
+from plumbline.moving import STRIDE
+from plumbline.physics import G
+from plumbline.still import LOAD
+from plumbline.tables import TABLES
+from plumbline.weak import Bump
+
+Array = NDArray[np.float64]
+
+METHODS: Mapping[str, str] = {"table": "com_table", "lab": "com_lab", "sesc": "com_others", "force": "com_force", "fused": "com_fused"}
+"""method -> its columns in `signals`; the subject's own is the one told by other trials."""
+FROM_FORCE = ("force", "fused")
+
+
+def centres(signals: pd.DataFrame, coverage: pd.DataFrame, poses: pd.DataFrame, *, half_width: float, exponent: int) -> pd.DataFrame:
+    """Table `centres` of a part.
+
+    half_width: of the bump [s].  Windows in which the vertical lacks more than
+    2 % of body weight by any method are left out: something touches the person there."""
+    rows = [
+        row
+        for subject, trials in signals.groupby("subject", observed=True, sort=True)
+        for row in _subject(str(subject), trials, coverage, poses[poses["subject"] == subject], half_width, exponent)
+    ]
+    return pd.DataFrame(rows, columns=[c.name for c in TABLES["centres"]])
+
+
+def _subject(
+    subject: str, signals: pd.DataFrame, coverage: pd.DataFrame, poses: pd.DataFrame, half_width: float, exponent: int
+) -> Iterator[dict[str, Any]]:  # fmt: skip
+    mass = {str(r["trial"]): float(r["mass"]) for _, r in coverage.iterrows()}
+    trials = [(str(t), rows.sort_values("frame")) for t, rows in signals.groupby("trial", observed=True, sort=True)]
+    each = [_residuals(rows, mass.get(t, np.nan), half_width, exponent) for t, rows in trials]
+    left = {m: np.concatenate([e[m] for e in each]) for m in METHODS}
+    off = {m: _at_rest(trials, poses, c) for m, c in METHODS.items()}
+    made = {m: _rms(r) for m, r in left.items()}
+    judged = {m: float(np.linalg.norm(v)) for m, v in made.items() if m not in FROM_FORCE and np.isfinite(v).all()}
+    order = sorted(judged, key=lambda m: judged[m])
+    for method in METHODS:
+        if len(left[method]) or len(off[method]):
+            yield {
+                "subject": subject, "method": method, "windows": len(left[method]), "poses": len(off[method]),
+                **{f"r_force_{a}": v for a, v in zip("xyz", made[method], strict=True)},
+                **{f"static_{a}": v for a, v in zip("xy", _rms(off[method]), strict=True)},
+                "rank": order.index(method) + 1 if method in order else 0,
+                "note": "made from the force: its residual says nothing" if method in FROM_FORCE else "",
+            }  # fmt: skip
+
+
+def _residuals(rows: pd.DataFrame, mass: float, half_width: float, exponent: int) -> dict[str, Array]:
+    """x'' - F/m of the windows of a trial by method [m/s2], (k, 3), the same windows for all that have a CoM there."""
+    time, grf = rows["time"].to_numpy(), rows[[f"grf_{a}" for a in "xyz"]].to_numpy()
+    rate = (len(time) - 1) / float(np.ptp(time)) if len(time) > 1 else 0.0
+    if half_width * rate < 4 or not np.isfinite(mass):
+        return {m: np.zeros((0, 3)) for m in METHODS}
+    b = Bump(half_width, exponent, rate)
+    measured = np.array([0.0, 0.0, G]) - b.mean(grf) / mass
+    r = {m: b.second(rows[[f"{c}_{a}" for a in "xyz"]].to_numpy()) + measured for m, c in METHODS.items()}
+    whole = [m for m in METHODS if m not in FROM_FORCE and known(r[m]).any()]
+    good = np.logical_and.reduce([known(r[m]) for m in whole]) if whole else np.zeros(len(time), dtype=bool)
+    for m in whole:  # a contact that no plate measured is nobody's fault
+        good &= ~(np.abs(r[m][:, 2]) > LOAD * G)
+    picked = np.flatnonzero(good)[:: max(round(half_width * rate * STRIDE), 1)]
+    return {m: v[picked][known(v[picked])] for m, v in r.items()}
+
+
+def _at_rest(trials: list[tuple[str, pd.DataFrame]], poses: pd.DataFrame, name: str) -> Array:
+    """CoM less ground projection of the still windows [m], (k, 2)."""
+    out = []
+    for trial, rows in trials:
+        mine = poses[(poses["trial"] == trial) & poses["used"]]
+        time, com = rows["time"].to_numpy(), rows[[f"{name}_x", f"{name}_y"]].to_numpy()
+        for at, length, x, y in mine[["time", "length", "ground_x", "ground_y"]].to_numpy():
+            inside = com[np.abs(time - at) <= length / 2]
+            if len(inside) and np.isfinite(inside).all():
+                out.append(inside.mean(axis=0) - (x, y))
+    return np.array(out).reshape(-1, 2)
+
+
+def _rms(values: Array) -> Array:
+    return np.asarray(np.sqrt(np.mean(values**2, axis=0))) if len(values) else np.full(values.shape[1], np.nan)
