@@ -61,6 +61,24 @@ POSES: Mapping[str, tuple[Turn, ...]] = {
 }
 
 
+def straight(body: Body) -> Body:
+    """A body of one frame with hanging arms and straight legs under it: joints stay where they are, limbs point down.
+
+    body: arrays (1, s, 3). Feet and hands keep how they point.
+    """
+    p, d = body.proximal.copy(), body.distal.copy()
+    for parts in (LEG, ARM):
+        for side in ("right", "left"):
+            chain = [body.names.index(f"{part}_{side}") for part in parts if f"{part}_{side}" in body.names]
+            for k, i in enumerate(chain):
+                if k:
+                    shift = d[0, chain[k - 1]] - body.distal[0, chain[k - 1]]
+                    p[0, i], d[0, i] = p[0, i] + shift, d[0, i] + shift
+                if k < 2:
+                    d[0, i] = p[0, i] - np.array([0.0, 0.0, np.linalg.norm(d[0, i] - p[0, i])])
+    return replace(body, proximal=p, distal=d)
+
+
 def posed(body: Body, name: str) -> Body:
     """A standing body of one frame in a pose of :data:`POSES`.  body: arrays (1, s, 3).  Raises KeyError for an unknown pose."""
     p, d = body.proximal[0].copy(), body.distal[0].copy()

@@ -21,7 +21,7 @@ from plumbline.markerset import MarkerSet, choose
 from plumbline.models.sesc import Noise, mean_covariance, spread
 from plumbline.moving import equations
 from plumbline.person_com import Columns, columns
-from plumbline.poses import POSES, posed
+from plumbline.poses import POSES, posed, straight
 from plumbline.signals import Recording
 from plumbline.still import Gate, windows
 from plumbline.study import Participant
@@ -33,7 +33,6 @@ HOLD = 5.0  # [s] that a recommended pose is held
 NEXT = 3  # poses that are recommended
 FRAMES = 300  # frames of a subject that stand for what it does
 REACH = 0.35  # [rad] from the nearest calibration pose, from which on a frame lies outside their range
-UPRIGHT = 0.9  # [1] cosine of a leg's angle with the vertical, from which on a frame shows somebody standing
 
 
 def of_part(
@@ -66,7 +65,7 @@ def of_part(
 def _trial(
     r: Recording, markerset: MarkerSet | None, who: Participant, mass: float, gate: Gate, tied: bool
 ) -> tuple[Trial | None, body.Body | None]:  # fmt: skip
-    """Columns and windows of one recording, None without a CoM from markers; and the body in a frame of it that stands upright."""
+    """Columns, windows and equations of one recording, None without a CoM from markers; and the person's standing figure."""
     if markerset is None or not r.markers:
         return None, None
     frame = body.build(r.markers, markerset, who.sex)
@@ -82,17 +81,14 @@ def _trial(
     return Trial(key, r.time, made, found, moving), _upright(frame)
 
 
-def _upright(frame: body.Body) -> body.Body | None:
-    """The body in the frame in which it stands straightest; None where it never stands."""
+def _upright(frame: body.Body) -> body.Body:
+    """The body in the frame in which its legs are straightest, limbs put straight: the person's figure for poses to come."""
     legs = [i for i, n in enumerate(frame.names) if n.startswith(("thigh", "shank"))] or list(range(len(frame.names)))
     u = frame.distal - frame.proximal
     u = u / np.linalg.norm(u, axis=2, keepdims=True)
-    down = np.where(known(frame.com()), np.abs(u[:, legs, 2]).min(axis=1), -1.0)
-    best = int(np.argmax(down))
-    if down[best] < UPRIGHT:
-        return None
+    best = int(np.argmax(np.where(known(frame.com()), np.abs(u[:, legs, 2]).min(axis=1), -1.0)))
     one = slice(best, best + 1)
-    return body.Body(frame.names, frame.numbers, frame.proximal[one], frame.distal[one], np.zeros(1, bool), [], [])
+    return straight(body.Body(frame.names, frame.numbers, frame.proximal[one], frame.distal[one], np.zeros(1, bool), [], []))
 
 
 # -- rows -------------------------------------------------------------------------------------------------------------

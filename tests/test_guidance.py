@@ -6,7 +6,7 @@ import pytest
 
 from plumbline import guidance
 from plumbline.person_com import columns
-from plumbline.poses import POSES, posed
+from plumbline.poses import POSES, posed, straight
 from plumbline.simulate import nine_segments
 
 
@@ -78,3 +78,15 @@ def test_frames_far_from_every_pose_are_outside() -> None:
     for k, angle in enumerate(np.radians([10.0, 30.0])):
         frames[k, 1] = [np.sin(angle), 0.0, -np.cos(angle)]
     assert guidance.outside(frames, u, 0.35).tolist() == [False, True]
+
+
+def test_a_figure_is_put_straight() -> None:
+    """From a squat with arms ahead back to hanging limbs: the standing figure's directions, lengths and joints."""
+    bent = posed(standing(), "squat, arms ahead")
+    back = straight(bent)
+    for name in ("thigh_left", "shank_right", "upper_arm_left", "forearm_right"):
+        i = back.names.index(name)
+        u = back.distal[0, i] - back.proximal[0, i]
+        assert np.allclose(u / np.linalg.norm(u), [0, 0, -1])
+    knee = back.names.index("shank_right")
+    assert np.allclose(back.proximal[0, knee], back.distal[0, back.names.index("thigh_right")])

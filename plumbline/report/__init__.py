@@ -10,7 +10,7 @@ import jinja2
 import pandas as pd
 
 from plumbline.effects import Effect, catalogue
-from plumbline.report import controller, first, linked, methods, sheets, verdicts, words
+from plumbline.report import centre, controller, first, linked, methods, sheets, verdicts, words
 
 DATA_FILES = ("page.html.j2", "page.css", "../../workflow/report/*.rst")  # the captions are those of the Snakemake report
 
@@ -81,7 +81,7 @@ def page(
         auto=auto,
         broken=verdict.get("broken_effects", []),
         counts=words.counts(tables),
-        sheets=sheets.all_sheets(tables) | verdicts.all_sheets(tables, verdict, known),
+        sheets=sheets.all_sheets(tables) | centre.all_sheets(tables) | verdicts.all_sheets(tables, verdict, known),
         controller=controller.section(tables),
         view=view,
         bokeh=linked.javascript() if view.roots else "",

@@ -1,0 +1,69 @@
+"""The page's part on the centre of mass: the subject's own against the table's, the methods side by side, what to record next."""
+
+import json
+from collections.abc import Mapping
+
+import pandas as pd
+
+from plumbline.report.sheets import Cell, Sheet, Show, cell, counted, decimals, joined, sheet, text, whole
+from plumbline.tables import empty
+
+
+def all_sheets(tables: Mapping[str, pd.DataFrame]) -> dict[str, Sheet]:
+    """Tables of the part by name; those of a study without markers say so."""
+    guidance, centres, poses = (tables.get(n, empty(n)) for n in ("guidance", "centres", "poses"))
+    return {"own": own(guidance), "centres": methods(centres), "poses": windows(poses)}
+
+
+def own(guidance: pd.DataFrame) -> Sheet:
+    """How well each subject's own CoM is known, and which pose to record next."""
+    shown = guidance.assign(
+        vertical=[rests(bool(ok), int(n)) for ok, n in zip(guidance["vertical_observable"], guidance["learnt"], strict=True)],
+        what=pd.Series([following(str(n)) for n in guidance["next"]], index=guidance.index, dtype=object),
+    )
+    columns: dict[str, tuple[str, Show]] = {
+        "subject": ("subject", text), "windows": ("still windows", whole), "learnt": ("directions learnt", whole),
+        **{f"table_sd_{a}": (f"table, {w} [mm]", decimals(1, 1000.0)) for a, w in zip("xyz", ("right", "forward", "up"), strict=True)},
+        **{f"sd_{a}": (f"own, {w} [mm]", decimals(1, 1000.0)) for a, w in zip("xyz", ("right", "forward", "up"), strict=True)},
+        "vertical": ("the vertical", joined), "what": ("record next", cell),
+    }  # fmt: skip
+    return sheet(shown, columns, "guidance", "No CoM from markers, so none of the subject's own.")
+
+
+def rests(observable: bool, learnt: int) -> str:
+    """What the vertical rests on, in words."""
+    if not learnt:
+        return "nothing was learnt: the table's"
+    return "told by the recordings" if observable else "not observable: it rests on the table and the spread of people"
+
+
+def following(steps: str) -> Cell:
+    """The best next pose, and what it and those after it would bring."""
+    found = json.loads(steps or "[]")
+    if not found:
+        return Cell("\u2013")
+    lines = (f"{s['pose']}: then {' / '.join(f'{1e3 * v:.1f}' for v in s['sd'])} mm" for s in found)
+    return Cell(str(found[0]["pose"]), tuple(lines))
+
+
+def methods(centres: pd.DataFrame) -> Sheet:
+    """CoM methods side by side."""
+    columns: dict[str, tuple[str, Show]] = {
+        "subject": ("subject", text), "method": ("CoM", text), "rank": ("rank", rank), "windows": ("windows in motion", whole),
+        **{f"r_force_{a}": (f"x'' - F/m, {w} [m/s\u00b2]", decimals(3)) for a, w in zip("xyz", ("right", "forward", "up"), strict=True)},
+        "poses": ("still windows", whole),
+        "static_x": ("at rest, right [mm]", decimals(1, 1000.0)), "static_y": ("at rest, forward [mm]", decimals(1, 1000.0)),
+        "note": ("note", joined),
+    }  # fmt: skip
+    return sheet(centres, columns, "centres", "No CoM beside forces.")
+
+
+def rank(value: float) -> str:
+    """A place; a dash where there is none."""
+    return f"{value:.0f}" if value else "\u2013"
+
+
+def windows(poses: pd.DataFrame) -> Sheet:
+    """Still windows by what became of them; sizes in the reasons are left to the table."""
+    said = poses.assign(what=poses["reason"].str.replace(r"[\d.]+ ?%? ?", "", regex=True).where(~poses["used"], "used"))
+    return counted(said, "windows", ["task", "what"], "No CoM from markers.")
