@@ -5,21 +5,23 @@ turns with :math:`\Omega = u \times \dot u`, :math:`u = (b - a)/|b - a|`; a turn
 Harrington ME et al. (2007) J Biomech 40:595-602 for hip centres; de Leva 1996 for the numbers (``plumbline/segments.py``).
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from plumbline.filters import known
-from plumbline.markerset import MarkerSet, Segment, point_inputs
+from plumbline import rigid
+from plumbline.filters import known, low_pass
+from plumbline.markerset import MarkerSet, Segment, point_inputs, share_of
 from plumbline.segments import Numbers
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 MIN_MASS = 0.9  # [1] share of body mass below which no CoM is given
+BEND = 4.0  # [Hz] a back bends slower than this; what is faster is noise, which the head's distance from the breastbone makes larger
 FORWARD = np.array([0.0, 1.0, 0.0])  # pipeline axes: the subject's back-to-front direction
 
 
@@ -93,16 +95,22 @@ class Body:
         return np.asarray(np.einsum("nsk,s->nk", spin, self.masses))
 
 
-def points(markers: Mapping[str, Array], markerset: MarkerSet) -> dict[str, Array]:
-    """Markers under the set's names, with the set's made points, each [m], shape (n, 3)."""
+def points(
+    markers: Mapping[str, Array], markerset: MarkerSet, sex: str = "", time: Array | None = None, notes: dict[str, list[str]] | None = None
+) -> dict[str, Array]:
+    """Markers under the set's names, with the set's made points, each [m], shape (n, 3).
+
+    time: [s], shape (n,); without it the bend of the back is not smoothed.  notes: what is to be said of carried points is added
+    here, as sentence -> the points it is true of.
+    """
     out = {name: markers[label] for name, label in markerset.resolve(markers).items()}
+    said: dict[str, list[str]] = {} if notes is None else notes
     for name, spec in markerset.points.items():
-        if name in out:
-            continue
-        try:
-            out[name] = _made(spec, out)
-        except KeyError:
+        if name in out or not out.keys() >= set(point_inputs(spec)):
             continue  # the segment that needs it is reported as missing, with its markers
+        out[name], note = _made(spec, out, sex, time)
+        if note:
+            said.setdefault(note, []).append(name)
     return out
 
 
@@ -111,13 +119,41 @@ def mean(names: Any, have: Mapping[str, Array]) -> Array:
     return np.asarray(sum(have[n] for n in names) / len(names))
 
 
-def _made(spec: Mapping[str, Any], have: Mapping[str, Array]) -> Array:
+def _made(spec: Mapping[str, Any], have: Mapping[str, Array], sex: str, time: Array | None) -> tuple[Array, str]:
+    """A made point and what is to be said of it."""
     if "hip" in spec:
         asis = [have[n] for n in spec["asis"]]
-        return hip_centre(asis[0], asis[1], mean(spec["psis"], have), spec["hip"])
+        return hip_centre(asis[0], asis[1], mean(spec["psis"], have), spec["hip"]), ""
     if "mean" in spec:
-        return mean(spec["mean"], have)
-    return np.asarray(mean(spec["at"], have) + spec["share"] * (mean(spec["to"], have) - mean(spec["from"], have)))
+        return mean(spec["mean"], have), ""
+    start, end = mean(spec["from"], have), mean(spec["to"], have)
+    point = mean(spec["at"], have) + share_of(spec, sex) * (end - start)
+    if "carried" not in spec:
+        return point, ""
+    off, note = _off_the_line(point, start, end, spec["carried"], have)
+    if time is not None and len(time) > 3:
+        off = low_pass(off, time, min(BEND, 0.2 / float(np.median(np.diff(time)))))
+    return point + off, note
+
+
+def _off_the_line(point: Array, start: Array, end: Array, by: Sequence[str], have: Mapping[str, Array]) -> tuple[Array, str]:
+    """How far [m], (n, 3), the markers `by` carry a point off the line start - end, on which it lies when upright; and a note.
+
+    Nowhere where fewer than three of the markers are seen in most of its frames. In the other frames it stays as far off as it is
+    before and after.
+    """
+    on = known(point)
+    there = [n for n in by if n in have and (known(have[n]) & on).sum() > on.sum() / 2]
+    line = "on a straight line in every frame (the back taken as straight):"
+    if len(there) < rigid.CARRIERS:
+        return np.zeros_like(point), f"{line} of {', '.join(by)} only {', '.join(there) or 'none'} is seen"
+    markers = np.stack([have[n] for n in there], axis=1)
+    moment = rigid.upright(np.where((known(markers).all(axis=1) & on)[:, None], start, np.nan), end)
+    off = rigid.carry(point, markers, moment.frames) - point if moment else np.full_like(point, np.nan)
+    if moment is None or not known(off).any():
+        return np.zeros_like(point), f"{line} {', '.join(there)} tell no turn"
+    note = f"placed where the trunk leans {moment.lean:.0f} deg, no frame is nearer upright" if moment.lean > rigid.LEANS else ""
+    return _carried(off, known(off)), note
 
 
 def hip_centre(right_asis: Array, left_asis: Array, mid_psis: Array, side: str) -> Array:
@@ -138,12 +174,15 @@ def hip_centre(right_asis: Array, left_asis: Array, mid_psis: Array, side: str) 
     return np.asarray(middle + forward * x + up * y + sign * out * z)
 
 
-def build(markers: Mapping[str, Array], markerset: MarkerSet, sex: str) -> Body:
+def build(markers: Mapping[str, Array], markerset: MarkerSet, sex: str, time: Array | None = None) -> Body:
     """Segments of a trial from its markers ([m], label -> (n, 3)) and a marker set.
+
+    time: [s], shape (n,), for the smoothing of the back's bend.
 
     A segment never seen is named in `missing` with its markers; one missing in some frames only is bridged.
     """
-    have = points(markers, markerset)
+    said: dict[str, list[str]] = {}
+    have = points(markers, markerset, sex, time, said)
     found = [(s, mean(s.proximal, have), mean(s.distal, have)) for s in markerset.segments if set(s.markers) <= set(have)]
     found = [(s, a, b) for s, a, b in found if known(a + b).any()]
     names = {s.name for s, _, _ in found}
@@ -151,7 +190,8 @@ def build(markers: Mapping[str, Array], markerset: MarkerSet, sex: str) -> Body:
     n = len(next(iter(markers.values()))) if markers else 0
     a = np.stack([f[1] for f in found], axis=1) if found else np.zeros((n, 0, 3))
     b = np.stack([f[2] for f in found], axis=1) if found else np.zeros((n, 0, 3))
-    body = Body([s.name for s, _, _ in found], [s.numbers(sex) for s, _, _ in found], a, b, np.zeros(n, bool), missing, [])
+    notes = [f"{', '.join(names)} {note}" for note, names in said.items()]
+    body = Body([s.name for s, _, _ in found], [s.numbers(sex) for s, _, _ in found], a, b, np.zeros(n, bool), missing, notes)
     _bridge(body)
     if sex == "" and body.share >= MIN_MASS and any(s.table for s, _, _ in found):
         body.notes.append("sex not stated in participants.tsv: segment numbers are the mean of both sexes")
@@ -164,8 +204,7 @@ def _lack(segment: Segment, have: Mapping[str, Array], markerset: MarkerSet) -> 
     def gone(name: str) -> list[str]:
         if name in have and known(have[name]).any():
             return []
-        inputs = markerset.points.get(name, {})
-        sources = [s for key, value in inputs.items() if isinstance(value, list) for s in value if key != "share"]
+        sources = point_inputs(markerset.points.get(name, {}))
         return [x for s in sources for x in gone(s)] or [name] if sources else [name]
 
     lacking = dict.fromkeys(x for name in segment.markers for x in gone(name))
@@ -222,5 +261,6 @@ def inputs(markerset: MarkerSet, names: list[str]) -> set[str]:
         if name in out:
             continue
         out.add(name)
-        todo += point_inputs(markerset.points.get(name, {}))
+        spec = markerset.points.get(name, {})
+        todo += [*point_inputs(spec), *spec.get("carried", ())]
     return out

@@ -8,13 +8,16 @@ A set is a YAML file::
       RHJC: {hip: right, asis: [RASI, LASI], psis: [RPSI, LPSI]}            # Harrington 2007
       RKJC: {at: [RKNE], from: [RHJC], to: [LHJC], share: 0.3}              # at + share * (to - from)
       RWJC: {mean: [RWRA, RWRB]}
+      OMPH: {at: [RHJC, LHJC], from: [RHJC, LHJC], to: [RSHO, LSHO], share: {F: 0.365, M: 0.283}, carried: [RASI, LASI, RPSI, LPSI]}
     segments:
       trunk:       {proximal: [C7], distal: [RHIP, LHIP], mass: 0.4346, com: 0.5138, gyration: 0.328}
       thigh_right: {proximal: [RHIP], distal: [RKNE], table: de-leva-1996/thigh}
     support: {left: [LHEE, LTOE], right: [RHEE, RTOE], half_width: 0.05}    # optional: the feet's outline, widened [m]
 
 ``proximal`` and ``distal`` are means of the markers named. ``mass`` is a share of the body, ``com`` (from the proximal end) and
-``gyration`` (about the segment's transverse axes) are shares of the length.
+``gyration`` (about the segment's transverse axes) are shares of the length. A ``share`` may differ by sex (the mean of both where the
+sex is not stated). A ``carried`` point is put there at the trial's upright moment, when the line ``from`` - ``to`` stands (`rigid.py`), and
+goes with these three or more markers (or points made before) ever after; in a file that has fewer than three of them it stays on the line.
 """
 
 from collections.abc import Iterable, Mapping
@@ -58,12 +61,19 @@ _POINT = _map(
     mean=_LABELS,
     at=_LABELS,
     **{"from": _LABELS, "to": _LABELS},
-    share={"type": "number"},
+    share={
+        "type": ["number", "object"],
+        "additionalProperties": False,
+        "required": ["F", "M"],
+        "properties": {"F": {"type": "number"}, "M": {"type": "number"}},
+    },
+    carried={**_LABELS, "minItems": 3, "uniqueItems": True},
     hip={"enum": ["left", "right"]},
     asis={**_LABELS, "minItems": 2, "maxItems": 2},
     psis=_LABELS,
 )
-_FORMS = ({"mean"}, {"at", "from", "to", "share"}, {"hip", "asis", "psis"})
+_FORMS = ({"mean"}, {"at", "from", "to", "share"}, {"at", "from", "to", "share", "carried"}, {"hip", "asis", "psis"})
+_NEEDED = ("mean", "at", "from", "to", "asis", "psis")  # keys whose points must be there for the made point to be
 SCHEMA = _map(
     ["segments"],
     about={"type": "string"},
@@ -120,7 +130,7 @@ class MarkerSet:
         """Names that can be had from a file with these labels, made points included."""
         names = set(self.resolve(labels))
         for point, spec in self.points.items():
-            if point not in names and point_inputs(spec) <= names:
+            if point not in names and names.issuperset(point_inputs(spec)):
                 names.add(point)
         return names
 
@@ -130,9 +140,17 @@ class MarkerSet:
         return sum(s.numbers(sex).mass for s in self.segments if names >= set(s.markers))
 
 
-def point_inputs(spec: Mapping[str, Any]) -> set[str]:
-    """Names a made point needs."""
-    return {name for key in ("mean", "at", "from", "to", "asis", "psis") for name in spec.get(key, ())}
+def point_inputs(spec: Mapping[str, Any]) -> list[str]:
+    """Names a made point needs, in the order of its keys; the markers that carry it are not among them: it can do without."""
+    return list(dict.fromkeys(name for key in _NEEDED for name in spec.get(key, ())))
+
+
+def share_of(spec: Mapping[str, Any], sex: str) -> float:
+    """Share [1] of the line at which a made point lies for ``sex`` "M", "F" or "" (mean of both)."""
+    share = spec["share"]
+    if not isinstance(share, Mapping):
+        return float(share)
+    return float(share[sex]) if sex else (share["F"] + share["M"]) / 2.0
 
 
 def built_in() -> list[str]:

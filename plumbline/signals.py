@@ -96,7 +96,7 @@ def _made(recording: Recording, participant: Participant, markerset: MarkerSet |
     outline = support.feet(recording.markers, markerset) if markerset else {}
     standing = contact.of_feet(recording.markers, outline, time)
     force = forces.net(recording.plates, time, standing)
-    frame = body.build(recording.markers, markerset, participant.sex) if markerset and recording.markers else None
+    frame = body.build(recording.markers, markerset, participant.sex, time) if markerset and recording.markers else None
     notes += force.notes + (frame.notes if frame else [])
     coms = {"table": frame.com() if frame else nothing, "lab": _lab(recording)}
     height = _height(coms, force, participant, notes)

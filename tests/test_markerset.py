@@ -6,12 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from plumbline import body, markerset
+from plumbline import body, markerset, segments
 from plumbline.errors import PlumblineError
 from plumbline.landmarks import landmarks_of
 from plumbline.markerset import MarkerSet, load, match, named, parse
 
 THIGH = {"proximal": ["RHIP"], "distal": ["RKNE"], "table": "de-leva-1996/thigh"}
+LINE = {"at": ["A"], "from": ["A"], "to": ["B"], "share": 0.3}
 OWN = {"proximal": ["A"], "distal": ["B"], "mass": 1.0, "com": 0.5, "gyration": 0.3}
 
 
@@ -31,6 +32,12 @@ def one(**spec: Any) -> MarkerSet:
         ({"segments": {"arm": {"proximal": ["A"], "distal": ["B"], "mass": 0.1}}}, r"segment 'arm', key 'com': missing"),
         ({"segments": {"arm": {**THIGH, "table": "de-leva-1996/leg"}}}, r"segment 'arm', key table 'de-leva-1996/leg': no row 'leg'"),
         ({"segments": {"arm": OWN}, "points": {"P": {"at": ["A"], "share": 1}}}, r"point 'P': keys \['at', 'share'\]"),
+        ({"segments": {"arm": OWN}, "points": {"P": {**LINE, "carried": ["B", "C"]}}}, r"point 'P', key 'carried': .* too short"),
+        ({"segments": {"arm": OWN}, "points": {"P": {**LINE, "carried": ["B", "C", "B"]}}}, r"point 'P', key 'carried': .*non-unique"),
+        ({"segments": {"arm": OWN}, "points": {"P": {"mean": ["A"], "carried": [*"BCD"]}}}, r"point 'P': keys \['carried', 'mean'\]"),
+        ({"segments": {"arm": OWN}, "points": {"P": {**LINE, "share": {"F": 0.3}}}}, r"point 'P', key 'share': 'M' is a required"),
+        ({"segments": {"arm": OWN}, "points": {"P": {**LINE, "share": {"F": 1, "m": 1, "M": 1}}}}, r"key 'share': unknown key 'm'"),
+        ({"segments": {"arm": OWN}, "points": {"P": {**LINE, "share": "half"}}}, r"point 'P', key 'share': 'half'"),
         ({"segments": {"arm": OWN, "leg": OWN}}, r"add up to 2.000"),
         (["arm"], r"holds no map"),
     ],
@@ -117,6 +124,35 @@ def test_a_mean_of_left_and_right_needs_both() -> None:
     assert whole == pytest.approx(1.0, abs=2e-4)
     assert mine.share(labels - {"LASI"}) < 0.2  # both hips, hence legs, trunk and the head's axis, need both ASIS
     assert mine.share({f"Anna:{x}" for x in labels}) == pytest.approx(whole)
+
+
+@pytest.mark.parametrize("name", ["opencap", "plug-in-gait", "pds", "opensim-gait"])
+def test_a_set_fits_files_without_the_markers_that_carry(name: str) -> None:
+    """The share of the body and the set that is found do not depend on the markers that only carry."""
+    mine = named(name)
+    points = mine.points.values()
+    needed = {m for p in points for m in markerset.point_inputs(p)} | {m for s in mine.segments for m in s.markers}
+    needed -= set(mine.points)
+    carry = {m for p in points for m in p.get("carried", ())}
+    assert carry - needed
+    assert mine.share(needed) == pytest.approx(mine.share(needed | carry))
+    assert match(needed) == match(needed | carry) == name
+
+
+@pytest.mark.parametrize("sex", ["F", "M", ""])
+@pytest.mark.parametrize("name", ["opencap", "plug-in-gait", "pds", "opensim-gait"])
+def test_a_straight_back_has_its_trunks_centre(name: str, sex: str) -> None:
+    """Three pieces on one line weigh and balance as de Leva's whole trunk does: mass within 1e-4, CoM within 1 % of its length."""
+    mine = named(name)
+    row = "trunk" if name == "opensim-gait" else "trunk-shoulders"
+    level = {p: markerset.share_of(mine.points[p], sex) for p in ("OMPH", "XYPH")}
+    level["SUPR"] = 1.0 + (markerset.share_of(mine.points["SUPR"], sex) if "SUPR" in mine.points else 0.0)
+    ends = {"pelvis": (level["OMPH"], 0.0), "abdomen": (level["XYPH"], level["OMPH"]), "thorax": (level["SUPR"], level["XYPH"])}
+    got = [(s.numbers(sex), *ends[s.name]) for s in mine.segments if s.name in ends]
+    mass = sum(n.mass for n, _, _ in got)
+    whole = segments.numbers(f"de-leva-1996/{row}", sex)
+    assert mass == pytest.approx(whole.mass, abs=1e-4)
+    assert sum(n.mass * (a + n.com * (b - a)) for n, a, b in got) / mass == pytest.approx(1.0 - whole.com, abs=0.01)
 
 
 def test_unknown_names_and_labels() -> None:
