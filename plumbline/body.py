@@ -22,7 +22,8 @@ Mask = NDArray[np.bool_]
 
 MIN_MASS = 0.9  # [1] share of body mass below which no CoM is given
 BEND = 4.0  # [Hz] a back bends slower than this; what is faster is noise, which the head's distance from the breastbone makes larger
-FORWARD = np.array([0.0, 1.0, 0.0])  # pipeline axes: the subject's back-to-front direction
+FORWARD = np.array([0.0, 1.0, 0.0])  # pipeline axes: the subject's back-to-front direction ...
+UP = np.array([0.0, 0.0, 1.0])  # ... and away from the ground
 
 
 @dataclass
@@ -127,6 +128,8 @@ def _made(spec: Mapping[str, Any], have: Mapping[str, Array], sex: str, time: Ar
     if "mean" in spec:
         return mean(spec["mean"], have), ""
     start, end = mean(spec["from"], have), mean(spec["to"], have)
+    if "upright" in spec:
+        return mean(spec["at"], have) + share_of(spec, sex) * _standing_length(start, end) * UP, ""
     point = mean(spec["at"], have) + share_of(spec, sex) * (end - start)
     if "carried" not in spec:
         return point, ""
@@ -134,6 +137,12 @@ def _made(spec: Mapping[str, Any], have: Mapping[str, Array], sex: str, time: Ar
     if time is not None and len(time) > 3:
         off = low_pass(off, time, min(BEND, 0.2 / float(np.median(np.diff(time)))))
     return point + off, note
+
+
+def _standing_length(start: Array, end: Array) -> float:
+    """Length of the line start - end at its upright moment [m]; NaN where it is never seen."""
+    moment = rigid.upright(start, end)
+    return float(np.linalg.norm((end - start)[moment.frames], axis=1).mean()) if moment else float("nan")
 
 
 def _off_the_line(point: Array, start: Array, end: Array, by: Sequence[str], have: Mapping[str, Array]) -> tuple[Array, str]:

@@ -17,7 +17,8 @@ A set is a YAML file::
 ``proximal`` and ``distal`` are means of the markers named. ``mass`` is a share of the body, ``com`` (from the proximal end) and
 ``gyration`` (about the segment's transverse axes) are shares of the length. A ``share`` may differ by sex (the mean of both where the
 sex is not stated). A ``carried`` point is put there at the trial's upright moment, when the line ``from`` - ``to`` stands (`rigid.py`), and
-goes with these three or more markers (or points made before) ever after; in a file that has fewer than three of them it stays on the line.
+goes with these three or more markers (or points made before) ever after; in a file that has fewer than three of them it stays on the
+line. With ``upright: true`` the way from ``at`` goes straight up in each frame, as long as at that moment: a head that looks ahead.
 """
 
 from collections.abc import Iterable, Mapping
@@ -67,12 +68,14 @@ _POINT = _map(
         "required": ["F", "M"],
         "properties": {"F": {"type": "number"}, "M": {"type": "number"}},
     },
+    upright={"const": True},
     carried={**_LABELS, "minItems": 3, "uniqueItems": True},
     hip={"enum": ["left", "right"]},
     asis={**_LABELS, "minItems": 2, "maxItems": 2},
     psis=_LABELS,
 )
-_FORMS = ({"mean"}, {"at", "from", "to", "share"}, {"at", "from", "to", "share", "carried"}, {"hip", "asis", "psis"})
+_LINE = {"at", "from", "to", "share"}
+_FORMS = ({"mean"}, _LINE, {*_LINE, "carried"}, {*_LINE, "upright"}, {"hip", "asis", "psis"})
 _NEEDED = ("mean", "at", "from", "to", "asis", "psis")  # keys whose points must be there for the made point to be
 SCHEMA = _map(
     ["segments"],

@@ -37,6 +37,7 @@ def one(**spec: Any) -> MarkerSet:
         ({"segments": {"arm": OWN}, "points": {"P": {"mean": ["A"], "carried": [*"BCD"]}}}, r"point 'P': keys \['carried', 'mean'\]"),
         ({"segments": {"arm": OWN}, "points": {"P": {**LINE, "share": {"F": 0.3}}}}, r"point 'P', key 'share': 'M' is a required"),
         ({"segments": {"arm": OWN}, "points": {"P": {**LINE, "share": {"F": 1, "m": 1, "M": 1}}}}, r"key 'share': unknown key 'm'"),
+        ({"segments": {"arm": OWN}, "points": {"P": {**LINE, "upright": False}}}, r"point 'P', key 'upright': True was expected"),
         ({"segments": {"arm": OWN}, "points": {"P": {**LINE, "share": "half"}}}, r"point 'P', key 'share': 'half'"),
         ({"segments": {"arm": OWN, "leg": OWN}}, r"add up to 2.000"),
         (["arm"], r"holds no map"),
