@@ -68,7 +68,7 @@ def _trial(
     """Columns, windows and equations of one recording, None without a CoM from markers; and the person's standing figure."""
     if markerset is None or not r.markers:
         return None, None
-    frame = body.build(r.markers, markerset, who.sex)
+    frame = body.build(r.markers, markerset, who.sex, r.time)
     if not known(frame.com()).any():
         return None, None
     standing = contact.of_feet(r.markers, support.feet(r.markers, markerset), r.time)
