@@ -152,7 +152,7 @@ class Person:
     """A subject's own CoM.
 
     calibration: from all of its trials that calibrate.  others: trial -> the same without that trial (without its fold, where there are
-    many); the whole one for trials that do not calibrate.
+    many); the whole one where the user says which trials calibrate: the others are left out already.
     """
 
     subject: str
@@ -182,7 +182,7 @@ def person(
         return calibrate([w for t in some for w in t.still], [t.moving for t in some] if motion else [], prior, noise)
 
     whole = told(used, noise)
-    fold = {t.key["trial"]: i % FOLDS for i, t in enumerate(used)}
+    fold = {t.key["trial"]: i % FOLDS for i, t in enumerate(used)} if not wanted else {}
     without = {k: told([t for t in used if fold[t.key["trial"]] != k], noise) for k in set(fold.values())}
     others = {t.key["trial"]: without.get(fold.get(t.key["trial"], -1), whole) for t in alike}
     return Person(subject, alike, alike[0].columns.parameters, whole, others)

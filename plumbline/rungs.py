@@ -68,6 +68,7 @@ def of_part(
         w2, h = (float(mine[k].iloc[0]) for k in ("w2", "h"))
         level = (w2, h) if not mine["reason"].iloc[0] else (gravity(windows), 1.0 / gravity(windows))
         chosen = models(config, tried, str(axis))
+        own_com = _Own(signals, pushes, coverage[coverage["subject"] == subject], str(axis), evaluation, effects)
         near = _near(tried[(tried["axis"] == axis) & (tried["subject"] == "all")])
         bench = _Bench(windows, effects, {*near, *(e for _, es in chosen for e in es)}, level, evaluation)
         plants = _plants(signals, pushes, coverage[coverage["subject"] == subject], str(axis), evaluation)
@@ -79,7 +80,10 @@ def of_part(
             if (listed and not members) or not {*members} - {CONTACT} <= {*bench.offered}:
                 continue
             about_model = {"rung": number, "model": name, "effects": ", ".join(listed)}
-            rungs += [row | about_model for row in bench.rung(members, trials, plants)]
+            exact = tuple(sorted(m for m in members if effects[m].exact))
+            rest = [m for m in members if m not in exact]
+            used = _Bench(own_com.windows(exact, windows), effects, {*rest}, level, evaluation) if exact else bench
+            rungs += [row | about_model for row in used.rung(rest, trials, {} if exact else plants)]
         shown.append(bench.contributions([(n, tuple(m for m in ms if effects[m].ledger == "plant")) for n, ms in chosen], near))
     return joined("rungs", [pd.DataFrame(rungs)] if rungs else []), joined("contributions", shown)
 
@@ -91,6 +95,26 @@ def _near(tried: pd.DataFrame) -> list[str]:
         tried[tried["status"].isin(["idle", "refused", "settled"])].dropna(subset=["fall_high"]).sort_values("fall_high", ascending=False)
     )
     return [*found, *(str(e) for e in others["effect"].head(NEAR))]
+
+
+class _Own:
+    """Windows of one subject and axis with other channels: for effects whose whole size physics fixes (`Effect.exact`)."""
+
+    def __init__(
+        self, signals: pd.DataFrame, pushes: pd.DataFrame, coverage: pd.DataFrame, axis: str, evaluation: Mapping[str, Any],
+        effects: Catalogue,
+    ) -> None:  # fmt: skip
+        self.given, self.axis, self.evaluation, self.effects = (signals, pushes, coverage), axis, evaluation, effects
+        self.made: dict[tuple[str, ...], list[Weak]] = {}
+
+    def windows(self, names: tuple[str, ...], usual: Sequence[Weak]) -> list[Weak]:
+        """Windows with some effects taken out, of the same trials as `usual`."""
+        if names not in self.made:
+            size = {n: np.array([float(p.physics or 0.0) for p in self.effects[n].parameters]) for n in names}
+            made = evidence.of_part(*self.given, self.effects, self.evaluation, undo=size, axis=self.axis)
+            wanted = {w.trial for w in usual}
+            self.made[names] = [replace(w, centre={}) for w in made if w.trial in wanted]  # gone for good
+        return self.made[names]
 
 
 @dataclass(frozen=True)

@@ -97,6 +97,11 @@ class Effect:
         if isinstance(self.needs, str) or isinstance(self.confounded, str):
             raise ValueError("needs and confounded are tuples: write ('com_x',) with the comma")
 
+    @property
+    def exact(self) -> bool:
+        """Whether a model that has it is judged with its whole size, which physics fixes, taken out of the channels."""
+        return self.undo is not None and not self.searched and all(p.physics is not None for p in self.parameters)
+
     def of_coefficients(self, theta: Array, constant: float = 0.0) -> Array:
         """Parameters from the coefficients of the columns and the constant of the kinematic side [N]."""
         return theta if self.values is None else np.asarray(self.values(theta, constant))
