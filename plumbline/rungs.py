@@ -82,7 +82,7 @@ def of_part(
             about_model = {"rung": number, "model": name, "effects": ", ".join(listed)}
             exact = tuple(sorted(m for m in members if effects[m].exact))
             rest = [m for m in members if m not in exact]
-            used = _Bench(own_com.windows(exact, windows), effects, {*rest}, level, evaluation) if exact else bench
+            used = _Bench(own_com.windows(exact, windows), effects, {*rest}, level, evaluation, exact=True) if exact else bench
             rungs += [row | about_model for row in used.rung(rest, trials, {} if exact else plants)]
         shown.append(bench.contributions([(n, tuple(m for m in ms if effects[m].ledger == "plant")) for n, ms in chosen], near))
     return joined("rungs", [pd.DataFrame(rungs)] if rungs else []), joined("contributions", shown)
@@ -138,11 +138,16 @@ def _plants(
 
 
 class _Bench:
-    """Windows of one subject and axis, on which models are tried.  level: w2 [1/s2] and lever per acceleration [s2]."""
+    """Windows of one subject and axis, on which models are tried.
+
+    level: w2 [1/s2] and lever per acceleration [s2].  exact: what physics fixes is not fitted: the mechanics written out.
+    """
 
     def __init__(
-        self, windows: list[Weak], effects: Catalogue, wanted: set[str], level: tuple[float, float], evaluation: Mapping[str, Any]
+        self, windows: list[Weak], effects: Catalogue, wanted: set[str], level: tuple[float, float], evaluation: Mapping[str, Any],
+        exact: bool = False,
     ) -> None:  # fmt: skip
+        self.exact = exact
         self.windows, self.effects, self.evaluation = windows, effects, evaluation
         able = {k for k in windows[0].terms if all(k in w.terms for w in windows)}
         self.offered = sorted(wanted & able)
@@ -166,7 +171,7 @@ class _Bench:
 
     def _with_contact(self, contact: outer.Contact, members: Sequence[str], trials: Sequence[Trial]) -> Iterator[dict[str, Any]]:
         """The same with a contact beside the plates: the rest is fitted where it does not act; no free run, as nobody measured it."""
-        still = _Bench(outer.quiet(self.windows, contact), self.effects, set(members), self.level, self.evaluation)
+        still = _Bench(outer.quiet(self.windows, contact), self.effects, set(members), self.level, self.evaluation, self.exact)
         number = {w.trial: k for k, w in enumerate(still.windows)}
         rest = [self.error(w, self.fit(()), ()) for w in self.windows]
         judged: set[str] = set()
@@ -184,13 +189,23 @@ class _Bench:
         """Coefficients of a model over some pieces."""
         columns = self.sums.of([m for m in members if m in self.offered])
         h = int(own(self.sums, "=h")[0])
-        got = fit(self.sums, self.weight, columns, among=among, known={h: self._height()} if self.fixed else {})
+        known = self._physics(members) if self.exact else {}
+        got = fit(self.sums, self.weight, columns, among=among, known=known | ({h: self._height()} if self.fixed else {}))
         if self.fixed:
             return got
         # a rung is judged by the whole equation, as the paper's is: its one w2 is fitted there, beside what the effects are known to add
         others = {int(c): float(v) for c, v in zip(got.columns, got.theta, strict=True) if c != h}
         whole = np.array([float(e == "whole") for e in self.sums.equations])
         return fit(self.sums, whole, columns, among=among, known=others)
+
+    def _physics(self, members: Sequence[str]) -> dict[int, float]:
+        """Column -> the coefficient that physics fixes."""
+        out = dict[int, float]()
+        for name in members:
+            effect = self.effects[name]
+            if name in self.offered and effect.values is None and all(p.physics is not None for p in effect.parameters):
+                out |= {int(c): float(p.physics or 0.0) for c, p in zip(own(self.sums, name), effect.parameters, strict=True)}
+        return out
 
     def _height(self) -> float:
         """z over g at the mean height [s2]."""
