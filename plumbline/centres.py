@@ -2,7 +2,8 @@ r"""The CoM methods side by side, ranked per subject by what they must obey: New
 
 In motion :math:`r = m\ddot x - F_x` (and the same forward and up) in the weak form; at rest the distance from the ground projection of
 still windows. A subject's own CoM (``sesc``) is judged as its *other* trials tell it. Methods made from the force obey it by
-construction: their residual is shown, and not ranked.
+construction: their residual is shown, and not ranked. A delay of the force record behind the markers, as the vertical tells it, is
+undone first for what the markers make; a constant is taken off in each trial, as the shear of plates has a zero error.
 """
 
 from collections.abc import Iterator, Mapping
@@ -13,7 +14,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from plumbline.filters import known
-from plumbline.moving import STRIDE
+from plumbline.moving import STRIDE, earlier, late_by
 from plumbline.physics import G
 from plumbline.still import LOAD
 from plumbline.tables import TABLES
@@ -68,14 +69,19 @@ def _residuals(rows: pd.DataFrame, mass: float, half_width: float, exponent: int
     if half_width * rate < 4 or not np.isfinite(mass):
         return {m: np.zeros((0, 3)) for m in METHODS}
     b = Bump(half_width, exponent, rate)
-    measured = np.array([0.0, 0.0, G]) - b.mean(grf) / mass
-    r = {m: b.second(rows[[f"{c}_{a}" for a in "xyz"]].to_numpy()) + measured for m, c in METHODS.items()}
+    com = {m: rows[[f"{c}_{a}" for a in "xyz"]].to_numpy() for m, c in METHODS.items()}
+    z = next((com[m][:, 2] for m in ("table", "lab") if known(com[m]).any()), np.full(len(time), np.nan))
+    pull = grf / mass
+    made = b.mean(pull), b.mean(earlier(pull, late_by(b, pull[:, 2], z, rate) * rate))
+    fixed = {m: np.array([0.0, 0.0, G]) - made[m not in FROM_FORCE] for m in METHODS}
+    r = {m: b.second(v) + fixed[m] for m, v in com.items()}
     whole = [m for m in METHODS if m not in FROM_FORCE and known(r[m]).any()]
     good = np.logical_and.reduce([known(r[m]) for m in whole]) if whole else np.zeros(len(time), dtype=bool)
     for m in whole:  # a contact that no plate measured is nobody's fault
         good &= ~(np.abs(r[m][:, 2]) > LOAD * G)
     picked = np.flatnonzero(good)[:: max(round(half_width * rate * STRIDE), 1)]
-    return {m: v[picked][known(v[picked])] for m, v in r.items()}
+    kept = {m: v[picked][known(v[picked])] for m, v in r.items()}
+    return {m: v - v.mean(axis=0) if len(v) else v for m, v in kept.items()}
 
 
 def _at_rest(trials: list[tuple[str, pd.DataFrame]], poses: pd.DataFrame, name: str) -> Array:

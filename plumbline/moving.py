@@ -61,8 +61,8 @@ def equations(c: Columns, force: Forces, ang_mom: Array, time: Array, mass: floa
         return Equations(np.zeros(0), np.zeros((5, 0, q)), np.zeros((5, 0)))
     b = Bump(HALF_WIDTH, EXPONENT, rate)
     r = c.table - np.array([0.0, 0.0, force.surface])
-    late = _late(b, force.grf[:, 2] / mass, r[:, 2], rate)
-    a, p = (_earlier(v, late * rate) for v in (force.grf / mass, force.zmp[:, :2]))
+    late = late_by(b, force.grf[:, 2] / mass, r[:, 2], rate)
+    a, p = (earlier(v, late * rate) for v in (force.grf / mass, force.zmp[:, :2]))
     pull = b.mean(a) - np.array([0.0, 0.0, G]) - b.second(r)
     down = b.mean(a[:, 2])
     curved = b.second(c.basis.reshape(len(time), -1)).reshape(c.basis.shape)
@@ -78,7 +78,7 @@ def equations(c: Columns, force: Forces, ang_mom: Array, time: Array, mass: floa
     return Equations(time[pick], m[:, pick], v[:, pick], late)
 
 
-def _late(b: Bump, a: Array, z: Array, rate: float) -> float:
+def late_by(b: Bump, a: Array, z: Array, rate: float) -> float:
     """By how much a force record is late behind the markers [s], from the vertical, where the segment table errs least.
 
     Least squares of what the vertical lacks on the slope of the force, with `DELAY` as what is likely; windows that lack more than a
@@ -93,7 +93,7 @@ def _late(b: Bump, a: Array, z: Array, rate: float) -> float:
     return late
 
 
-def _earlier(values: Array, samples: float) -> Array:
+def earlier(values: Array, samples: float) -> Array:
     """A record put back by some samples, linear between them; NaN where it was, and at the ends.  values: (n, d)."""
     at = np.arange(len(values)) + samples
     out = np.full(values.shape, np.nan)

@@ -75,7 +75,7 @@ def _trial(
     weight = mass if np.isfinite(mass) else r.mass
     force = forces.net(r.plates, r.time, standing)
     made, found = windows(frame, force, r.time, weight, gate, tied)
-    moving = equations(made, force, frame.angular_momentum(r.time, weight), r.time, r.mass if np.isfinite(r.mass) else weight)
+    moving = equations(made, force, frame.angular_momentum(r.time, weight), r.time, weight)
     t = r.trial
     key = {"trial": t.trial, "subject": t.subject, "task": t.task, "condition": t.condition}
     return Trial(key, r.time, made, found, moving), _upright(frame)

@@ -118,7 +118,7 @@ TABLES: dict[str, list[Column]] = {
         _c("method", "str", "", "table, lab, sesc (told by the subject's other trials), force, fused"),
         _c("windows", "int", "", "windows in motion"),
         _c("poses", "int", "", "still windows"),
-        *_xyz("r_force", "m/s2", "rms of what is left of x'' - F/m"),
+        *_xyz("r_force", "m/s2", "sd of what is left of x'' - F/m, within trials"),
         _c("static_x", "float", "m", "rms distance from the ground projection of the still windows, right"),
         _c("static_y", "float", "m", "the same, forward"),
         _c("rank", "int", "", "by r_force, all directions together; 0: not ranked"),
