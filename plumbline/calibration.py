@@ -28,6 +28,7 @@ ROUNDS = 8
 MOST = 600  # windows of one fit; more are thinned evenly: neighbours say the same
 FOLDS = 8  # groups of trials that are left out in turn
 COARSEST = 0.02  # [m] floor beyond which the data do not fit a chain at all
+CHANCE = 3.0  # standard deviations of the misfit that chance alone makes
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ class Calibration:
 def calibrate(windows: Sequence[Told], moving: Sequence[Equations], prior: Prior, noise: Noise = USUAL) -> Calibration:
     """The parameters of a person from still windows, all of them used, and from equations of motion.
 
-    Where the residual of the still windows is larger than its noise, their floor is raised until it is not: what no chain follows
+    Where the residual of the still windows is larger than its noise and chance make it, their floor is raised until it is not: what no chain follows
     widens the bands. The noise of each equation of motion is what is left of it, found together with the parameters; windows overlap,
     so that `MEMORY` seconds of them count as one.
     """
@@ -69,8 +70,9 @@ def calibrate(windows: Sequence[Told], moving: Sequence[Equations], prior: Prior
     def misfit(floor: float) -> float:
         return model.batch(wide, _still(chosen, len(prior.mean), replace(noise, floor=floor), directions)).misfit
 
-    if chosen and misfit(noise.floor) > 1.0:
-        floor = COARSEST if misfit(COARSEST) > 1.0 else float(brentq(lambda f: misfit(f) - 1.0, noise.floor, COARSEST, rtol=0.02))
+    chance = 1.0 + CHANCE * np.sqrt(1.0 / max(len(chosen), 1))  # two rows a window: the mean of n squares has variance 2/n
+    if chosen and misfit(noise.floor) > chance:
+        floor = COARSEST if misfit(COARSEST) > chance else float(brentq(lambda f: misfit(f) - chance, noise.floor, COARSEST, rtol=0.02))
         noise = replace(noise, floor=floor)
     rows = _still(chosen, len(prior.mean), noise, directions)
     return _with_motion(rows, moving, wide, noise, directions)
