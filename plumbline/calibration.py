@@ -59,9 +59,9 @@ class Calibration:
 def calibrate(windows: Sequence[Told], moving: Sequence[Equations], prior: Prior, noise: Noise = USUAL) -> Calibration:
     """The parameters of a person from still windows, all of them used, and from equations of motion.
 
-    Where the residual of the still windows is larger than its noise and chance make it, their floor is raised until it is not: what no chain follows
-    widens the bands. The noise of each equation of motion is what is left of it, found together with the parameters; windows overlap,
-    so that `MEMORY` seconds of them count as one.
+    Where the residual of the still windows is larger than its noise and chance make it, their floor is raised until it is not: what no
+    chain follows widens the bands. The noise of each equation of motion is what is left of it, found together with the parameters;
+    windows overlap, so that `MEMORY` seconds of them count as one.
     """
     chosen = list(windows[:: -(-len(windows) // MOST)]) if windows else []
     directions = np.array([w.directions for _, w in chosen])
