@@ -1,7 +1,7 @@
 r"""The paper's chain of seven parameters, and what an estimator gets of one recording.
 
 Nine segments with spherical joints, left and right alike, the CoM of a limb on its axis: :math:`c = r_0 + B R` (eq. 6) with the
-middle of the hips :math:`r_0`, :math:`B` = [front, right, up of the trunk | summed directions of both upper arms, forearms, thighs, shanks].
+middle of the hips :math:`r_0`, :math:`B` = [front, right, up of the trunk | summed directions of upper arms, forearms, thighs, shanks].
 """
 
 from collections.abc import Sequence

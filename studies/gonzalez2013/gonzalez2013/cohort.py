@@ -1,16 +1,16 @@
 """What the method does for forty people: one row per person, way of calibrating and motion it is judged on; and a table with goals."""
 
 import resource
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from time import perf_counter
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from gonzalez2013 import estimators as es
-from gonzalez2013.people import Protocol, Seen, judged, measured, person, seen, standing
 from numpy.typing import NDArray
 
+from gonzalez2013 import estimators as es
+from gonzalez2013.people import Protocol, Seen, judged, measured, person, seen, standing
 from plumbline import guidance, poses
 from plumbline.models.sesc import USUAL
 from plumbline.person_com import columns
@@ -25,6 +25,9 @@ TIMES = (0.25, 1.0, 4.0)  # spread of the prior over the published one
 STARTS = (0.003, 0.01, 0.02, 0.05, 0.1, 0.3, 1.0)  # [m] what the paper's recursion may believe of its start
 FORCE = 0.02  # [m/s2] noise of F/m: 1.4 N in 70 kg
 FRAMES = 300
+HOLDS = 4
+NAMES = {"static": "paper's protocol", "extended": "extended protocol"}
+HELD = {"standing": "all standing", "lie": "one lying"}
 
 
 class Way(NamedTuple):
@@ -64,7 +67,7 @@ def ways() -> dict[str, Way]:
     out |= {f"prior x {t:g}": Way("static", True, _prior("static", t)) for t in TIMES}
     out |= {"prior wrong": Way("static", True, _prior("static", 1.0, wrong=True))}
     out |= {f"from {w}, {sd:g} m": Way("static", True, _start(sd, w == "zero")) for w in ("zero", "table") for sd in STARTS}
-    batch, worse = es.PAPER["batch"], {"least squares": es.total_least_squares, "wandering": es.wandering}
+    batch, worse = es.PAPER["batch"], {"least squares": es.seven, "total least squares": es.total_least_squares, "wandering": es.wandering}
     out |= {
         "extended": Way("extended", True, _plain("extended", batch)),
         "extended, real": Way("extended", False, _plain("extended", batch)),
@@ -97,7 +100,7 @@ def _rows(plan: Protocol, people: Iterable[nine.Body]) -> Iterator[dict[str, Any
 
 
 def observed(plan: Protocol, people: Sequence[nine.Body]) -> pd.DataFrame:
-    """Per protocol and person: share of the prior's vertical sd that is left without trusting a constant of the CoP, the flag, predicted sd.
+    """Per protocol and person: share of the prior's vertical sd left without trusting a constant of the CoP, the flag, predicted sd.
 
     The volume is the intended motion. Columns: protocol, subject, left, observable, floor, misfit, windows, sd_x, sd_y, sd_z.
     """
@@ -116,20 +119,27 @@ def observed(plan: Protocol, people: Sequence[nine.Body]) -> pd.DataFrame:
 
 
 def designed(plan: Protocol, count: int = 5) -> pd.DataFrame:
-    """Poses chosen one after the other for the volume, by where the person may be: columns among, hold, pose, sd_x, sd_y, sd_z."""
+    """Poses chosen one after the other for the volume: columns among, hold, pose, sd_x, sd_y, sd_z.
+
+    among: standing, or with one seated (sit) or lying (lie) pose first.
+    """
     motion = _thin(plan.scenes["volume"].columns.basis)
     basis = np.concatenate([motion, np.zeros((len(motion), 3, 2))], axis=2)
     prior = plan.scenes["volume"].columns.prior()
     cov = np.zeros((basis.shape[2],) * 2)
     cov[:-2, :-2], cov[-2:, -2:] = prior.covariance, USUAL.constant**2 * np.eye(2)
+    sd = hold_sd(USUAL, HOLD)
     made = {name: np.hstack([columns(poses.posed(standing(), name)).basis[0, :2], np.eye(2)]) for name in poses.POSES}
-    sets = {"standing": ("stand", "squat", "half"), "standing or sitting": ("stand", "squat", "half", "sit"), "any": ("",)}
+    upright = [k for k in made if k.startswith(("stand", "squat", "half"))]
     out = []
-    for among, starts in sets.items():
-        some = {k: v for k, v in made.items() if k.startswith(starts)}
-        for i, step in enumerate(guidance.next_poses(cov, basis, some, hold_sd(USUAL, HOLD), count), 1):
-            sd = np.hypot(step.sd, USUAL.floor)
-            out.append({"among": among, "hold": i, "pose": step.pose} | {f"sd_{a}": v for a, v in zip("xyz", sd, strict=True)})
+    for among in ("standing", "sit", "lie"):
+        now = cov
+        for i in range(1, count + 1):
+            some = [k for k in made if k.startswith(among)] if i == 1 and among != "standing" else upright
+            step = guidance.next_poses(now, basis, {k: made[k] for k in some}, sd)[0]
+            now = guidance.after(now, made[step.pose] / sd)
+            row = {"among": among, "hold": i, "pose": step.pose}
+            out.append(row | {f"sd_{a}": v for a, v in zip("xyz", np.hypot(step.sd, USUAL.floor), strict=True)})
     return pd.DataFrame(out)
 
 
@@ -150,7 +160,10 @@ def timed(plan: Protocol, people: Sequence[nine.Body]) -> pd.DataFrame:
         spent["fit"] += perf_counter() - made
     n = len(people)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024  # [MB] where the system counts in kB
-    rows = [("one fit from windows", spent["fit"] / n, "s", "<= 0.2"), ("its windows from markers and forces", spent["windows"] / n, "s", "")]
+    rows = [
+        ("one fit from windows", spent["fit"] / n, "s", "<= 0.2"),
+        ("its windows from markers and forces", spent["windows"] / n, "s", ""),
+    ]
     rows += [(f"{n} people, both", sum(spent.values()), "s", "<= 60"), ("largest memory of the process", peak, "MB", "")]
     return pd.DataFrame(rows, columns=["what", "value", "unit", "goal"])
 
@@ -196,30 +209,37 @@ LINES = (
     Line("paper's recursion from zero, 3-D", "kalman_zero", "static", "distance", "median"),
     Line("the same, bounded", "kalman_bounded", "static", "distance", "median"),
     Line("paper's recursion from a weak prior, 3-D", "kalman_weak", "static", "distance", "median"),
-    Line("imperfect: total least squares, 3-D", "extended, real, least squares", "extended", "distance", "median"),
+    Line("imperfect: seven parameters by least squares, no prior, 3-D", "extended, real, least squares", "extended", "distance", "median"),
+    Line("imperfect: the same by total least squares, 3-D", "extended, real, total least squares", "extended", "distance", "median"),
     Line("imperfect: wandering parameters, 3-D", "extended, real, wandering", "extended", "distance", "median"),
     Line("imperfect: with m a = F, 3-D", "extended, real, m a = F", "extended", "distance", "median"),
 )
 
 
-def summary(rows: pd.DataFrame) -> pd.DataFrame:
-    """The table: what, value, unit, paper, goal, met ("" without a goal)."""
-    reduce: Mapping[str, Callable[[pd.Series], float]] = {
-        "median": lambda v: float(v.median()), "p90": lambda v: float(v.quantile(0.9)), "mean": lambda v: float(v.mean()),
-    }  # fmt: skip
-    out = []
-    for line in LINES:
-        mine = rows[(rows["way"] == line.way) & (rows["motion"] == line.motion)]
-        value = reduce[line.statistic](mine[line.value]) * (1e3 if line.unit == "mm" else 1.0)
-        out.append(
-            {"what": line.what, "value": value, "unit": line.unit, "paper": line.paper, "goal": line.goal, "met": _met(value, line.goal)}
-        )
-    return pd.DataFrame(out)
+def summary(rows: pd.DataFrame, flags: pd.DataFrame, holds: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
+    """The table: what, value, unit, paper, goal, met ("" without a goal).  Arguments: tables of the functions above."""
+    out = [_of_people(rows, line) for line in LINES]
+    for protocol, goal in (("static", "0-0"), ("extended", "1-1")):
+        mine = flags[flags["protocol"] == protocol]
+        out.append((f"vertical called observable, {NAMES[protocol]}", float(mine["observable"].mean()), "1", "", goal))
+        out.append((f"share of the prior's vertical sd left, {NAMES[protocol]}", float(mine["left"].median()), "1", "", ""))
+        out.append((f"predicted vertical sd, {NAMES[protocol]}", 1e3 * float(mine["sd_z"].median()), "mm", "", ""))
+    for among, goal in (("standing", "<= 6"), ("lie", "<= 3.5")):
+        sd = holds.loc[(holds["among"] == among) & (holds["hold"] == HOLDS), "sd_z"]
+        out.append((f"four designed holds of {HOLD:g} s, {HELD[among]}: predicted vertical sd", 1e3 * float(sd.iloc[0]), "mm", "", goal))
+    out += [(t.what, t.value, t.unit, "", t.goal) for t in times.itertuples(index=False)]
+    table = pd.DataFrame(out, columns=["what", "value", "unit", "paper", "goal"])
+    return table.assign(met=[_met(v, g) for v, g in zip(table["value"], table["goal"], strict=True)])
+
+
+def _of_people(rows: pd.DataFrame, line: Line) -> tuple[str, float, str, str, str]:
+    values = rows.loc[(rows["way"] == line.way) & (rows["motion"] == line.motion), line.value]
+    reduce = {"median": values.median, "mean": values.mean, "p90": lambda: values.quantile(0.9)}[line.statistic]
+    return line.what, float(reduce()) * (1e3 if line.unit == "mm" else 1.0), line.unit, line.paper, line.goal
 
 
 def _met(value: float, goal: str) -> str:
     if not goal:
         return ""
-    low, high = (0.0, float(goal[3:])) if goal.startswith("<=") else tuple(float(v) for v in goal.split("-"))
+    low, high = (0.0, float(goal[3:])) if goal.startswith("<=") else map(float, goal.split("-"))
     return "yes" if low <= value <= high else "no"
-

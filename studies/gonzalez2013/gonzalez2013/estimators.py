@@ -72,11 +72,10 @@ def rows(scenes: Sequence[Scene], noise: Noise = USUAL) -> Rows:
     return Rows(np.concatenate(h) / sd, np.concatenate(y) / sd)
 
 
-def kalman(scenes: Sequence[Scene], mean: Array, sd: float, bounds: Bounds | None = None, drift: float = 0.0) -> Told:
-    """The paper's recursion (eq. 8-11).  mean (7,), sd [m]: what it starts from.  drift: sd by which parameters wander, over sd of the start."""
+def kalman(scenes: Sequence[Scene], mean: Array, sd: float, bounds: Bounds | None = None) -> Told:
+    """The paper's recursion (eq. 8-11) without drift.  mean (7,), sd [m]: what it starts from."""
     h = rows(scenes)
-    cov = sd**2 * np.eye(7)
-    state = sesc.recursive(Prior(mean, cov), h, drift**2 / len(h.values) * cov if drift else None, bounds)
+    state = sesc.recursive(Prior(mean, sd**2 * np.eye(7)), h, None, bounds)
     return lambda s: (s.root + s.basis @ state.mean, sesc.spread(s.basis, state.covariance))
 
 
@@ -99,19 +98,21 @@ def kalman_weak(scenes: Sequence[Scene]) -> Told:
 # -- what makes it worse ----------------------------------------------------------------------------------------------
 
 
-def whitened(c: Calibration) -> tuple[Array, Array, Array]:
-    """Rows of a calibration in units of the prior's sd, with the prior's own rows below: matrix, values, and these sd (q,)."""
-    p = c.posterior.prior
-    sd = np.sqrt(np.diag(p.covariance))
-    return np.vstack([c.rows.matrix * sd, np.eye(len(sd))]), np.append(c.rows.values - c.rows.matrix @ p.mean, np.zeros(len(sd))), sd
+def seven(scenes: Sequence[Scene]) -> Told:
+    """Least squares of the seven parameters, nothing known before: what total least squares is compared with."""
+    h = rows(scenes)
+    return _of_seven(np.linalg.lstsq(h.matrix, h.values, rcond=None)[0])
 
 
 def total_least_squares(scenes: Sequence[Scene]) -> Told:
-    """The same rows and prior, but errors in the pose counted as large as errors of the plates: the smallest singular vector."""
-    c = calibrated(scenes)
-    h, y, sd = whitened(c)
-    v = np.linalg.svd(np.column_stack([h, y]), full_matrices=False)[2][-1]
-    return _shifted(c, c.posterior.prior.mean - sd * v[:-1] / v[-1])
+    """The same with errors of the pose counted as those of the plates: the smallest singular vector of [H y]."""
+    h = rows(scenes)
+    v = np.linalg.svd(np.column_stack([h.matrix, h.values]), full_matrices=False)[2][-1]
+    return _of_seven(-v[:-1] / v[-1])
+
+
+def _of_seven(r: Array) -> Told:
+    return lambda s: (s.root + s.basis @ r, np.full((len(s.time), 3), np.nan))
 
 
 def wandering(scenes: Sequence[Scene]) -> Told:

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gonzalez2013.chain import Scene, scene
 from numpy.typing import NDArray
 
+from gonzalez2013.chain import Scene, scene
 from plumbline import body as bodies
 from plumbline.forces import Forces
 from plumbline.markerset import MarkerSet, load
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 MARKERSET = Path(__file__).resolve().parents[1] / "markerset.yaml"
 
 COP, MISALIGNED, SHAKEN = 0.002, 1.5, 0.4  # [m], [degrees], [degrees] of the instruments that are not perfect
-THIN = 10  # every so many frames errors are taken
+FRAMES = 600  # over which errors are taken, evenly spread
 
 
 @dataclass(frozen=True)
@@ -38,15 +38,14 @@ class Protocol:
         return {k: seen(m, m.pose) for k, m in self.motions.items()}
 
 
-def protocol(rate: float = 100.0, short: float = 1.0) -> Protocol:
-    """The four motions.  rate [Hz].  short: the paper's two recordings last this share of their time."""
-    ways = routes.EXTENDED if short == 1.0 else routes.EXTENDED[:: max(round(0.5 / short), 1)]
+def protocol(rate: float = 100.0, every: int = 1) -> Protocol:
+    """The four motions.  rate [Hz].  every: of the extended protocol's poses only each so-many-th."""
     return Protocol(
         {
-            "static": mc.paper(300.0 * short, rate),
-            "volume": mc.volume(60.0 * short, rate),
-            "sts": mc.sit_to_stand(2.0, rate),
-            "extended": routes.extended(rate, ways),
+            "static": mc.paper(rate=rate),
+            "volume": mc.volume(rate=rate),
+            "sts": mc.sit_to_stand(rate=rate),
+            "extended": routes.extended(rate, routes.EXTENDED[::every]),
         }
     )
 
@@ -99,7 +98,8 @@ def _spoilt(pose: Pose, seed: int, motion: int) -> Pose:
 
 def judged(com: Array, sd: Array, truth: Array) -> dict[str, Any]:
     """Errors of a CoM [m]: mean 3-D distance, mean ground distance, rms per axis, mean predicted sd upwards, its band's coverage [1]."""
-    e, sd = (com - truth)[::THIN], sd[::THIN]
+    every = max(len(com) // FRAMES, 1)
+    e, sd = (com - truth)[::every], sd[::every]
     out: dict[str, Any] = {"distance": np.linalg.norm(e, axis=1).mean(), "ground": np.linalg.norm(e[:, :2], axis=1).mean()}
     out |= {f"rms_{a}": v for a, v in zip("xyz", np.sqrt((e**2).mean(axis=0)), strict=True)}
     covered = np.mean(np.abs(e[:, 2]) < 1.96 * sd[:, 2]) if np.isfinite(sd).all() else np.nan
