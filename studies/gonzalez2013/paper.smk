@@ -35,6 +35,7 @@ rule paper_tables:
 rule cohort:
     output:
         people="results/paper/people.parquet",
+        many="results/paper/many.parquet",
         flags="results/paper/flags.parquet",
         holds="results/paper/holds.parquet",
         summary="results/paper/cohort.tsv",

@@ -168,7 +168,7 @@ def test_designed_holds_and_flags(plan: people.Protocol, few: pd.DataFrame) -> N
     flags = cohort.observed(plan, nine.cohort(1)).set_index("protocol")
     assert flags.loc["extended", "left"] < flags.loc["static", "left"]
     times = pd.DataFrame([("one fit from windows", 0.01, "s", "<= 0.2")], columns=["what", "value", "unit", "goal"])
-    table = cohort.summary(few, flags.reset_index(), cohort.designed(plan, 4), times)
+    table = cohort.summary(few, cohort.covered(plan, 2), flags.reset_index(), cohort.designed(plan, 4), times)
     assert set(table["met"]) <= {"", "yes", "no"}
     assert np.isfinite(table["value"]).all()
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from gonzalez2013 import estimators as es
 from gonzalez2013.people import Protocol, Seen, judged, measured, person, seen, standing
 from plumbline import guidance, poses
+from plumbline.figures import _style as figures
 from plumbline.models.sesc import USUAL
 from plumbline.person_com import columns
 from plumbline.sesc import HOLD, hold_sd
@@ -20,7 +21,7 @@ from plumbline.simulate import nine_segments as nine
 
 Array = NDArray[np.float64]
 
-PEOPLE = 40
+PEOPLE, MANY = 40, 200
 TIMES = (0.25, 1.0, 4.0)  # spread of the prior over the published one
 STARTS = (0.003, 0.01, 0.02, 0.05, 0.1, 0.3, 1.0)  # [m] what the paper's recursion may believe of its start
 FORCE = 0.02  # [m/s2] noise of F/m: 1.4 N in 70 kg
@@ -96,6 +97,19 @@ def _rows(plan: Protocol, people: Iterable[nine.Body]) -> Iterator[dict[str, Any
                 yield {"subject": who.participant_id, "way": name, "motion": motion} | judged(*told(p.scenes[motion]), p.com[motion])
 
 
+def covered(plan: Protocol, count: int = MANY) -> pd.DataFrame:
+    """Bands of the paper's protocol in many people: one person's vertical error hardly changes, so that forty are forty draws.
+
+    Columns: subject, and those of :func:`judged` on the volume.
+    """
+    some = Protocol({k: plan.motions[k] for k in ("static", "volume")})
+    out = []
+    for who in nine.cohort(count):
+        p = person(some, who)
+        out.append({"subject": who.participant_id} | judged(*es.batch([p.scenes["static"]])(p.scenes["volume"]), p.com["volume"]))
+    return pd.DataFrame(out)
+
+
 # -- what the protocols can tell --------------------------------------------------------------------------------------
 
 
@@ -144,7 +158,7 @@ def designed(plan: Protocol, count: int = 5) -> pd.DataFrame:
 
 
 def _thin(basis: Array) -> Array:
-    return basis[np.unique(np.linspace(0, len(basis) - 1, FRAMES).astype(int))]
+    return np.asarray(basis[np.unique(np.linspace(0, len(basis) - 1, FRAMES).astype(int))])
 
 
 def timed(plan: Protocol, people: Sequence[nine.Body]) -> pd.DataFrame:
@@ -199,9 +213,9 @@ LINES = (
     Line("the same, judged on the sit-to-stand", "extended", "sts", "distance", "median"),
     Line("extended, imperfect instruments, 3-D", "extended, real", "extended", "distance", "median", goal="<= 5.0"),
     Line("the same, segment table", "table, real", "extended", "distance", "median"),
-    Line("band of 95 % upwards, paper's protocol", "batch", "volume", "cover_z", "mean", "1", goal="0.90-0.99"),
-    Line("band of 95 % upwards, extended", "extended", "volume", "cover_z", "mean", "1", goal="0.90-0.99"),
-    Line("band of 95 % upwards, extended, imperfect", "extended, real", "volume", "cover_z", "mean", "1", goal="0.90-0.99"),
+    Line("band of 95 % upwards, paper's protocol", "batch", "volume", "cover_z", "mean", "1"),
+    Line("band of 95 % upwards, extended", "extended", "volume", "cover_z", "mean", "1"),
+    Line("band of 95 % upwards, extended, imperfect", "extended, real", "volume", "cover_z", "mean", "1"),
     *(Line(f"prior x {t:g}, 3-D", f"prior x {t:g}", "static", "distance", "median") for t in TIMES),
     *(Line(f"prior x {t:g}, band of 95 % upwards", f"prior x {t:g}", "static", "cover_z", "mean", "1") for t in TIMES),
     Line("prior's mean wrong by 1 sd, 3-D", "prior wrong", "static", "distance", "median"),
@@ -216,9 +230,12 @@ LINES = (
 )
 
 
-def summary(rows: pd.DataFrame, flags: pd.DataFrame, holds: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
+def summary(rows: pd.DataFrame, many: pd.DataFrame, flags: pd.DataFrame, holds: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     """The table: what, value, unit, paper, goal, met ("" without a goal).  Arguments: tables of the functions above."""
     out = [_of_people(rows, line) for line in LINES]
+    out.append((f"band of 95 % upwards, paper's protocol, {len(many)} people", float(many["cover_z"].mean()), "1", "", "0.90-0.99"))
+    out.append((f"held-out volume, 3-D, median of {len(many)} people", 1e3 * float(many["distance"].median()), "mm", "19.65", ""))
+    out.append((f"the same, 90 % of {len(many)} people", 1e3 * float(many["distance"].quantile(0.9)), "mm", "", ""))
     for protocol, goal in (("static", "0-0"), ("extended", "1-1")):
         mine = flags[flags["protocol"] == protocol]
         out.append((f"vertical called observable, {NAMES[protocol]}", float(mine["observable"].mean()), "1", "", goal))
@@ -227,15 +244,15 @@ def summary(rows: pd.DataFrame, flags: pd.DataFrame, holds: pd.DataFrame, times:
     for among, goal in (("standing", "<= 6"), ("lie", "<= 3.5")):
         sd = holds.loc[(holds["among"] == among) & (holds["hold"] == HOLDS), "sd_z"]
         out.append((f"four designed holds of {HOLD:g} s, {HELD[among]}: predicted vertical sd", 1e3 * float(sd.iloc[0]), "mm", "", goal))
-    out += [(t.what, t.value, t.unit, "", t.goal) for t in times.itertuples(index=False)]
+    out += [(t.what, t.value, t.unit, "", t.goal) for t in figures.rows(times)]
     table = pd.DataFrame(out, columns=["what", "value", "unit", "paper", "goal"])
     return table.assign(met=[_met(v, g) for v, g in zip(table["value"], table["goal"], strict=True)])
 
 
 def _of_people(rows: pd.DataFrame, line: Line) -> tuple[str, float, str, str, str]:
     values = rows.loc[(rows["way"] == line.way) & (rows["motion"] == line.motion), line.value]
-    reduce = {"median": values.median, "mean": values.mean, "p90": lambda: values.quantile(0.9)}[line.statistic]
-    return line.what, float(reduce()) * (1e3 if line.unit == "mm" else 1.0), line.unit, line.paper, line.goal
+    number = float(values.mean()) if line.statistic == "mean" else float(values.quantile(0.5 if line.statistic == "median" else 0.9))
+    return line.what, number * (1e3 if line.unit == "mm" else 1.0), line.unit, line.paper, line.goal
 
 
 def _met(value: float, goal: str) -> str:

@@ -101,7 +101,7 @@ def kalman_weak(scenes: Sequence[Scene]) -> Told:
 def seven(scenes: Sequence[Scene]) -> Told:
     """Least squares of the seven parameters, nothing known before: what total least squares is compared with."""
     h = rows(scenes)
-    return _of_seven(np.linalg.lstsq(h.matrix, h.values, rcond=None)[0])
+    return _of_seven(np.asarray(np.linalg.lstsq(h.matrix, h.values, rcond=None)[0], dtype=np.float64))
 
 
 def total_least_squares(scenes: Sequence[Scene]) -> Told:
