@@ -31,7 +31,7 @@ rule paper_tables:
         "paper_tables.py"
 
 
-# Simulates forty people of its own and judges them against their truth (about five minutes of one core).
+# Simulates forty people of its own and judges them against their truth (about four minutes of one core).
 rule cohort:
     output:
         people="results/paper/people.parquet",
