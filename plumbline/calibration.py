@@ -26,7 +26,7 @@ MEMORY = 1.2  # [s] a slow trial of 13 s holds about ten independent blocks
 ROUNDS = 8
 MOST = 600  # windows of one fit; more are thinned evenly: neighbours say the same
 FOLDS = 8  # groups of trials that are left out in turn
-POOR = 1.2  # [1] misfit of still windows, from which on their noise is looked for
+CHANCE = 3.0  # standard deviations of the misfit that chance alone makes
 LOUDER, RAISED = (1.0, 1.6, 2.5, 4.0, 6.3), (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # [1] times the usual noise, the usual floor
 
 
@@ -58,9 +58,9 @@ class Calibration:
 def calibrate(windows: Sequence[Told], moving: Sequence[Equations], prior: Prior, noise: Noise = USUAL) -> Calibration:
     """The parameters of a person from still windows, all of them used, and from equations of motion.
 
-    Where the residual of the still windows is larger than its noise, the noise is what makes them most likely: more of what no chain
-    follows, or more of everything, widens the bands. The noise of each equation of motion is what is left of it, found together with
-    the parameters; windows overlap, so that `MEMORY` seconds of them count as one.
+    Where the residual of the still windows is larger than its noise and chance make it, the noise is what makes them most likely: more
+    of what no chain follows, or more of everything, widens the bands. The noise of each equation of motion is what is left of it, found
+    together with the parameters; windows overlap, so that `MEMORY` seconds of them count as one.
     """
     chosen = list(windows[:: -(-len(windows) // MOST)]) if windows else []
     directions = np.array([w.directions for _, w in chosen])
@@ -69,7 +69,8 @@ def calibrate(windows: Sequence[Told], moving: Sequence[Equations], prior: Prior
     def told(noise: Noise) -> Posterior:
         return model.batch(wide, _still(chosen, len(prior.mean), noise, directions))
 
-    if chosen and told(noise).misfit > POOR:
+    chance = 1.0 + CHANCE * np.sqrt(1.0 / max(len(chosen), 1))  # two rows a window: the mean of n squares has variance 2/n
+    if chosen and told(noise).misfit > chance:
         louder = [
             replace(noise, white=noise.white * k, slow=noise.slow * k, floor=f) for k in LOUDER for f in noise.floor * np.array(RAISED)
         ]

@@ -4,7 +4,8 @@ Plates are usually faster than cameras. Each frame gets the average of the plate
 *centred on the frame's time* (weights of a trapezoid, symmetric, hence without phase); slower or equally fast plates are
 interpolated. At the ends of the force record the window shrinks on both sides alike; outside of it the values are NaN. Forces and
 moments are averaged, the plates' wrenches are added, however small, and the CoP is formed from the sum: leaving out 8 of 700 N
-under a light foot would move the ZMP by 3 mm. Only a plate that stands empty counts as zero (``plumbline/contact.py``).
+under a light foot would move the ZMP by 3 mm. Only a plate that stands empty counts as zero (``plumbline/contact.py``); a handle or a
+seat always counts, and says nothing of the floor's height.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,7 +20,7 @@ from scipy.signal import oaconvolve
 from plumbline import contact
 from plumbline.contact import Foot
 from plumbline.filters import known
-from plumbline.loads import LOADED, light_below, surface
+from plumbline.loads import LOADED, NO_FOOT, floor, light_below, surface
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -109,11 +110,11 @@ def net(plates: Sequence[Plate], frames: Array, feet: Mapping[str, Foot] = Mappi
     feet: side -> a foot's markers at the frames; without them an empty plate is told by its load (``plumbline/contact.py``).
     """
     n = len(frames)
-    used = [p for p in plates if len(p.time) > 1 and (known(p.cop).any() or np.nanmax(p.force[:, 2], initial=0.0) > LOADED)]
+    used = [p for p in plates if len(p.time) > 1 and (p.foot == NO_FOOT or _carries(p))]
     out = Forces(np.full((n, 3), np.nan), np.full((n, 3), np.nan), np.nan)
     if not used:
         return out
-    out.surface = surface(p.cop for p in used)
+    out.surface = surface(p.cop for p in floor(used))
     if not any(np.isfinite(p.force[:, 2]).any() for p in used):
         out.zmp = _cop_only(used, frames, out.notes)
         return out
@@ -127,12 +128,16 @@ def net(plates: Sequence[Plate], frames: Array, feet: Mapping[str, Foot] = Mappi
     return out
 
 
+def _carries(plate: Plate) -> bool:
+    return bool(known(plate.cop).any() or np.nanmax(plate.force[:, 2], initial=0.0) > LOADED)
+
+
 def _sum(wrenches: Sequence[Array], plates: Sequence[Plate]) -> tuple[Array, Array]:
     """Force [N] and CoP [m] of several plates together, (n, 3) each; a force component that one lacks is NaN."""
     total = np.sum(wrenches, axis=0)
     force = total[:, :3].copy()
     force[:, [bool(any(np.isnan(p.force[:, k]).all() for p in plates)) for k in range(3)]] = np.nan
-    return force, _cop(total, surface(p.cop for p in plates))
+    return force, _cop(total, surface(p.cop for p in floor(plates)))
 
 
 def _loads(plate: Plate, frames: Array, least: float, feet: Mapping[str, Foot], notes: list[str]) -> Array:
@@ -141,6 +146,8 @@ def _loads(plate: Plate, frames: Array, least: float, feet: Mapping[str, Foot], 
     lost = int((np.isnan(plate.moment).any(axis=1) & (plate.force[:, 2] >= least)).sum())
     if lost:
         notes.append(f"plate {plate.number}: loaded without a CoP in {lost} samples: no ZMP there")
+    if plate.foot == NO_FOOT:
+        return wrench
     load = wrench[:, 2]
     light = load < least
     standing = [feet[plate.foot]] if plate.foot in feet else list(feet.values()) if len(feet) == 2 else []

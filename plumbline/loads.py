@@ -3,9 +3,10 @@
 Everything here is in the pipeline's axes (x right, y forward, z up), SI, unless a docstring says lab axes.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ COP_FORCE = 20.0  # [N] no CoP below this or 3 % of the largest load
 STANDING = 0.6  # [m] a net CoP that travels further is no standing
 STEADY = 0.4  # [1] 10th to 90th percentile of the load over its median, up to which it is standing
 CLEAR = 0.3  # [1] least correlation that decides the sign of the shear
+NO_FOOT = "none"  # what a plate says that is a handle or a seat: it counts however light, and lies at no floor's height
 
 
 @dataclass
@@ -30,7 +32,7 @@ class Plate:
     number: from 1, in the file's order.  time: [s], shape (k,).  force: [N], shape (k, 3), NaN where not recorded.
     moment: about the coordinates' origin [N m], shape (k, 3), kept however small the load; NaN where a load has no valid CoP.
     cop: on the plate's surface [m], shape (k, 3), NaN while unloaded.  free_moment: vertical, about the CoP [N m], shape (k,).
-    corners: [m], shape (4, 3), or None.  foot: "left", "right" or "".
+    corners: [m], shape (4, 3), or None.  foot: "left", "right", "none" (a handle, a seat) or "".
     """
 
     number: int
@@ -51,11 +53,11 @@ def usable(plates: list[RawPlate], task: str, notes: list[str]) -> dict[int, Raw
 
     Raises Refused(unloaded) where none is loaded, Refused(stuck_channel) where a channel of a loaded plate does not move.
     """
-    loaded = {i: p for i, p in enumerate(plates, 1) if _peak(p) > LOADED}
+    loaded = {i: p for i, p in enumerate(plates, 1) if _peak(p) > (0.0 if p.foot == NO_FOOT else LOADED)}
     idle = [f"plate {i} ({_offset(p):+.0f} N)" for i, p in enumerate(plates, 1) if i not in loaded]
     if task == "empty":
         return dict(enumerate(plates, 1))
-    if not loaded:
+    if not floor(list(loaded.values())):
         raise Refused(
             "unloaded",
             f"nobody stands on the plates: {', '.join(idle)}",
@@ -114,10 +116,10 @@ def _without_blank_shear(number: int, plate: RawPlate, notes: list[str]) -> RawP
 # -- reaction and CoP -------------------------------------------------------------------------------------------------
 
 
-def reaction(number: int, raw: RawPlate, matrix: Array, turn: bool = True) -> tuple[Plate, float]:
+def reaction(number: int, raw: RawPlate, matrix: Array, sign: float | None = None) -> tuple[Plate, float]:
     """One plate in the pipeline's axes with the sign that makes its vertical force a reaction, and that sign (+1 or -1).
 
-    raw: lab axes.  matrix: pipeline from lab, shape (3, 3).  turn: False keeps the recorded sign (nobody on it).
+    raw: lab axes.  matrix: pipeline from lab, shape (3, 3).  sign: stated; None: found.
     Force and moment change sign together, so the CoP does not depend on it. A light load whose place the file does not tell is
     put at the plate's origin: 20 N there are nearer to the truth than none.
     """
@@ -125,7 +127,8 @@ def reaction(number: int, raw: RawPlate, matrix: Array, turn: bool = True) -> tu
     corners = None if raw.corners is None else turned(raw.corners, matrix)
     up = np.nan_to_num(force[:, 2])
     on = np.abs(up) >= 0.5 * np.abs(up).max()
-    sign = -1.0 if turn and np.median(up[on]) < 0 else 1.0
+    if sign is None:
+        sign = -1.0 if np.median(up[on]) < 0 else 1.0
     force, moment = sign * force, sign * moment
     moment[np.isnan(moment).any(axis=1) & (np.abs(up) < COP_FORCE)] = 0.0
     height = float(np.mean(corners[:, 2])) if corners is not None else float(origin[2])
@@ -175,6 +178,20 @@ def drop_light(plates: list[Plate]) -> None:
 # -- all plates together ----------------------------------------------------------------------------------------------
 
 
+class Carrier(Protocol):
+    """What says which foot it carries."""
+
+    foot: str
+
+
+P = TypeVar("P", bound=Carrier)
+
+
+def floor(plates: Sequence[P]) -> list[P]:
+    """Plates that feet can stand on: not a handle, not a seat."""
+    return [p for p in plates if p.foot != NO_FOOT]
+
+
 def surface(cops: Iterable[Array]) -> float:
     """Height of several plates together [m]: mean of the median heights of their CoP (k, 3); NaN without any."""
     heights = [float(np.nanmedian(cop[:, 2])) for cop in cops if np.isfinite(cop[:, 2]).any()]
@@ -187,7 +204,7 @@ def total(plates: list[Plate]) -> tuple[Array, Array, Array]:
     at = partial(_at, time)
     force = np.sum([at(p.time, p.force) for p in plates], axis=0)
     moment = np.sum([at(p.time, p.moment) for p in plates], axis=0)
-    cop, _ = centre(force, moment, np.zeros(3), surface(p.cop for p in plates))
+    cop, _ = centre(force, moment, np.zeros(3), surface(p.cop for p in floor(plates)))
     return time, force, cop[:, :2]
 
 
@@ -223,7 +240,7 @@ def standing(plates: list[Plate], climb: float = 0.0) -> Standing:
     mass = _mass(up, on, climb) if stays and spread < STEADY and travel < STANDING else float("nan")
     if not (np.isfinite(force[:, :2]).mean(axis=0) > 0.5).any():
         return Standing(mass, float("nan"), ["no shear force is recorded: the CoM cannot be had from the forces"])
-    if not stays or spread > 1.5 * STEADY or travel > STANDING or _take_turns(plates):
+    if not stays or spread > 1.5 * STEADY or travel > STANDING or _take_turns(floor(plates)):
         return Standing(mass, 1.0, ["moving on the plates does not show the sign of the shear; taken as the vertical force's"])
     sign, note = shear_sign(time, force, cop)
     return Standing(mass, sign, [note])

@@ -111,7 +111,7 @@ def _find_axes(raw: Raw, carrying: Mapping[int, RawPlate], task: str) -> lab.Axe
     points, labels = raw.points, list(raw.labels)
     if "CentreOfMass" in raw.derived:
         points, labels = np.concatenate([points, raw.derived["CentreOfMass"][:, None]], axis=1), [*labels, "com"]
-    return lab.find(points, labels, [] if task == "empty" else list(carrying.values()))
+    return lab.find(points, labels, [] if task == "empty" else loads.floor(list(carrying.values())))
 
 
 def _read(file: Path, columns: Sequence[Mapping[str, Any]], read: Reader) -> Raw:
@@ -159,12 +159,16 @@ def _put_plates(out: Recording, raw: Raw, carrying: Mapping[int, RawPlate], foun
             out.notes.append("CoP without forces: only measures of the CoP can be had")
         return
     empty = out.trial.task == "empty"
-    made = [loads.reaction(i, plate, found.matrix, not empty) for i, plate in carrying.items()]
-    out.plates = [plate for plate, _ in made]
-    signs = {sign for _, sign in made}
+    stated = 1.0 if empty else None
+    made = {i: loads.reaction(i, p, found.matrix, stated) for i, p in carrying.items() if p.foot != loads.NO_FOOT}
+    signs = {sign for _, sign in made.values()}
+    # a hand may pull either way: what it says has the sign of the plates
+    made |= {i: loads.reaction(i, p, found.matrix, min(signs, default=1.0)) for i, p in carrying.items() if i not in made}
+    out.plates = [made[i][0] for i in carrying]
     out.force_sign = signs.pop() if len(signs) == 1 else math.nan
     if math.isnan(out.force_sign):
-        out.notes.append("plates differ in the sign of their vertical force: " + ", ".join(f"plate {p.number} {s:+.0f}" for p, s in made))
+        said = ", ".join(f"plate {p.number} {s:+.0f}" for p, s in made.values())
+        out.notes.append(f"plates differ in the sign of their vertical force: {said}")
     loads.drop_light(out.plates)
     if empty:
         return
@@ -175,7 +179,7 @@ def _put_plates(out: Recording, raw: Raw, carrying: Mapping[int, RawPlate], foun
     out.mass, out.shear_sign = stand.mass, stand.shear
     out.notes += stand.notes
     if out.shear_sign < 0:
-        for plate in out.plates:
+        for plate in loads.floor(out.plates):
             loads.turn_shear(plate)
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from plumbline.body import points
 from plumbline.contact import Foot
 from plumbline.forces import Forces, Plate
-from plumbline.loads import LOADED
+from plumbline.loads import LOADED, NO_FOOT
 from plumbline.markerset import MarkerSet
 
 Array = NDArray[np.float64]
@@ -66,7 +66,7 @@ def limits(
         width = foot_markers(markerset)[1]
         note = f"support limits from the markers of {' and '.join(sorted(outline))} foot, widened by {width * 1000:.0f} mm"
         return Support(_from_feet(outline, standing, forces, width), "markers", note)
-    corners = [p.corners for p in plates if p.corners is not None and np.isfinite(p.cop).any()]
+    corners = [p.corners for p in plates if p.corners is not None and p.foot != NO_FOOT and np.isfinite(p.cop).any()]
     if corners:
         border = _box(np.concatenate(corners)[None])
         return Support(np.repeat(border, n, axis=0), "plates", "support limits from the loaded plates' corners")

@@ -72,7 +72,7 @@ TABLES: dict[str, list[Column]] = {
     "plates": [
         *KEY[:2],
         _c("plate", "int", "", "from 1, in the file's order"),
-        _c("foot", "str", "", "left, right or empty"),
+        _c("foot", "str", "", "left, right, none (a handle, a seat) or empty"),
         _c("sample", "int", "", "from 0 within the trial"),
         _c("time", "float", "s", "the file's own time"),
         *_xyz("force", "N", "ground reaction on the person"),

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from made_recording import SOMEBODY, Array, Plate, columns, pendulum
 
-from plumbline import com_force, contact, forces
+from plumbline import com_force, contact, forces, loads
+from plumbline.contact import Foot
 from plumbline.markerset import load
+from plumbline.readers.raw import RawPlate
 from plumbline.signals import signals
 
 
@@ -221,3 +223,26 @@ def test_a_light_foot_keeps_the_net_zmp_and_the_support(tmp_path: Path) -> None:
         assert np.sqrt(np.mean(part**2, axis=0)).max() < 0.3e-3
         assert np.abs(part.mean(axis=0)).max() < 0.05e-3
     assert kinds == [["recovering_from_beyond"], ["recovering", "recovering"]]
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_handle_counts_however_little_it_bears(sign: float) -> None:
+    """A hand that pulls 15 N down and 10 N back at 1.1 m stays in the net wrench, with the plates' sign, and leaves the floor's height."""
+    n, rng = 500, np.random.default_rng(5)
+    pull, place = np.array([2.0, -10.0, -15.0]), np.array([0.2, 0.4, 1.1])
+    foot_load, foot_place = np.array([-2.0, 10.0, 715.0]), np.array([0.01, 0.05, 0.0])
+
+    def raw(force: Array, at: Array, foot: str) -> RawPlate:
+        shaken = sign * (force + rng.normal(0.0, 0.01, (n, 3)))
+        return RawPlate(np.arange(n) / 100.0, shaken, np.zeros((n, 3)), at, None, "text", foot)
+
+    notes: list[str] = []
+    carrying = loads.usable([raw(foot_load, foot_place, ""), raw(pull, place, loads.NO_FOOT)], "static", notes)
+    assert list(carrying) == [1, 2]
+    plates = [loads.reaction(1, carrying[1], np.eye(3))[0], loads.reaction(2, carrying[2], np.eye(3), sign)[0]]
+    loads.drop_light(plates)
+    assert loads.standing(plates).mass == pytest.approx(700.0 / 9.81, rel=1e-3)
+    got = forces.net(plates, np.arange(n) / 100.0, {"left": Foot(np.zeros((n, 1, 3)), np.ones(n, bool))})
+    assert got.surface == 0.0
+    moment = np.cross(foot_place, foot_load) + np.cross(place, pull)
+    np.testing.assert_allclose(got.zmp[250], [-moment[1] / 700.0, moment[0] / 700.0, 0.0], atol=1e-4)

@@ -15,7 +15,7 @@ class RawPlate:
     time: [s], shape (k,).  force: [N], shape (k, 3), sign as recorded.  moment: [N m] about `origin`, shape (k, 3).
     origin: reference point of the moment [m], shape (3,) (the centre of the plate's surface where known).
     corners: [m], shape (4, 3), or None where the file has none.  kind: "type-2", "mot", "text", ...
-    foot: "left", "right" or "" where the file does not say.
+    foot: "left", "right", "none" (a handle, a seat) or "" where the file does not say.
     notes: what was found odd, in words (stuck channels are named "stuck: <channel>").
     """
 
