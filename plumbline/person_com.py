@@ -9,7 +9,8 @@ equivalent serial chain (Gonzalez 2013, eq. 6); it needs no link lengths, holds 
 
 A segment known by two points has axes :math:`u` (proximal to distal), and the part of the body's lateral axis across it.
 
-Spreads: masses 10 %, the CoM of a limb 2.5 % of its length along and 6 mm across in any direction, of the trunk 12, 3, 18 mm forward, lateral, up:
+Spreads: masses 10 %, the CoM of a limb 2.5 % of its length along and 6 mm off in any direction across, of the trunk 12, 3, 18 mm
+forward, lateral, up:
 the size by which the tables of Dempster (1955), Clauser (1969), Zatsiorsky (1983, as in de Leva 1996) and people measured by DXA
 (Durkin and Dowling 2003) differ; left from right by 3 %. Beside the segments the whole CoM may lie 10 mm further forward and 3 mm to
 the side in any pose, in the body's heading: tables of standing people are off by 3 to 25 mm in a direction that does not turn with

@@ -160,7 +160,7 @@ def test_what_makes_it_worse(few: pd.DataFrame) -> None:
 
 
 def test_designed_holds_and_flags(plan: people.Protocol, few: pd.DataFrame) -> None:
-    """Four poses of 5 s tell the vertical to 6 mm standing and 3.5 mm with one lying; the vertical rests on the prior in the paper's protocol alone."""
+    """Four poses of 5 s tell the vertical to 6 mm, 3.5 mm with one lying; it rests on the prior in the paper's protocol alone."""
     holds = cohort.designed(plan, 4).set_index(["among", "hold"])["sd_z"]
     assert holds["standing", 4] < 0.006
     assert holds["lie", 4] < 0.0035

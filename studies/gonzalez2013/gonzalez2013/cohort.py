@@ -239,7 +239,7 @@ def summary(rows: pd.DataFrame, many: pd.DataFrame, flags: pd.DataFrame, holds: 
     for protocol, goal in (("static", "0-0"), ("extended", "1-1")):
         mine = flags[flags["protocol"] == protocol]
         out.append((f"vertical called observable, {NAMES[protocol]}", float(mine["observable"].mean()), "1", "", goal))
-        out.append((f"share of the prior's vertical sd left, {NAMES[protocol]}", float(mine["left"].median()), "1", "", ""))
+        out.append((f"vertical error grows with a prior x 4, {NAMES[protocol]}", float(mine["rests"].median()), "1", "", ""))
         out.append((f"predicted vertical sd, {NAMES[protocol]}", 1e3 * float(mine["sd_z"].median()), "mm", "", ""))
     for among, goal in (("standing", "<= 6"), ("lie", "<= 3.5")):
         sd = holds.loc[(holds["among"] == among) & (holds["hold"] == HOLDS), "sd_z"]
