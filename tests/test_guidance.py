@@ -53,10 +53,8 @@ def test_four_holds_tell_the_vertical_to_6_mm_and_one_lying_down_to_3_5() -> Non
     assert held[-1].sd[2] < 0.006
     assert (np.diff([s.sd[2] for s in held]) < 0).all()
     supine = {k: v for k, v in candidates.items() if k.startswith("lie on the back")}
-    first = guidance.next_poses(wide, motion, supine, hold_sd(USUAL), 1)
     more = {**up, **supine}
     assert guidance.next_poses(wide, motion, more, hold_sd(USUAL), 4)[-1].sd[2] < 0.0035
-    assert first[0].sd[2] < 0.006
 
 
 def test_the_best_pose_is_the_one_that_lowers_the_variance_most() -> None:
