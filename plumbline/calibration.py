@@ -4,7 +4,7 @@ Numerics: ``plumbline/models/sesc.py``; parameters and spreads: ``plumbline/pers
 """
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +20,9 @@ from plumbline.still import Window
 Array = NDArray[np.float64]
 
 Told = tuple[str, Window]  # a trial, and a still window of it
+
+ALL = ("still", "force", "moment")
+"""Equations that calibrate: the gravity line at rest; Newton and Euler in motion."""
 
 START = (0.03, 0.03, 0.03, 0.003, 0.003)  # [m/s2], [m] noise of the equations of motion to begin with
 MEMORY = 1.2  # [s] a slow trial of 13 s holds about ten independent blocks
@@ -55,8 +58,10 @@ class Calibration:
         return self.posterior.covariance[:-2, :-2]
 
 
-def calibrate(windows: Sequence[Told], moving: Sequence[Equations], prior: Prior, noise: Noise = USUAL) -> Calibration:
-    """The parameters of a person from still windows, all of them used, and from equations of motion.
+def calibrate(
+    windows: Sequence[Told], moving: Sequence[Equations], prior: Prior, noise: Noise = USUAL, kinds: Collection[int] = range(len(EQUATIONS))
+) -> Calibration:  # fmt: skip
+    """The parameters of a person from still windows, all of them used, and from equations of motion, those of `EQUATIONS` in `kinds`.
 
     Where the residual of the still windows is larger than its noise and chance make it, the noise is what makes them most likely: more
     of what no chain follows, or more of everything, widens the bands. The noise of each equation of motion is what is left of it, found
@@ -76,7 +81,7 @@ def calibrate(windows: Sequence[Told], moving: Sequence[Equations], prior: Prior
         ]
         noise = max(louder, key=lambda n: told(n).evidence)
     rows = _still(chosen, len(prior.mean), noise, directions)
-    return _with_motion(rows, moving, wide, noise, directions)
+    return _with_motion(rows, moving, kinds, wide, noise, directions)
 
 
 def _still(chosen: Sequence[Told], q: int, noise: Noise, directions: Array) -> Rows:
@@ -99,28 +104,29 @@ def _still(chosen: Sequence[Told], q: int, noise: Noise, directions: Array) -> R
     return Rows(np.vstack(matrix), np.concatenate(values), unit)
 
 
-def _with_motion(still: Rows, moving: Sequence[Equations], prior: Prior, noise: Noise, directions: Array) -> Calibration:
+def _with_motion(
+    still: Rows, moving: Sequence[Equations], kinds: Collection[int], prior: Prior, noise: Noise, directions: Array
+) -> Calibration:  # fmt: skip
     """Still rows and equations of motion together; the noise of the latter by expectation and maximisation."""
-    used = [e for e in moving if len(e.time)]
-    sigma = np.array(START) if used else np.full(len(EQUATIONS), np.nan)
-    if not used:
+    used = [e for e in moving if len(e.time) > 1]
+    sigma = np.where([k in kinds for k in range(len(EQUATIONS))], START, np.nan) if used else np.full(len(EQUATIONS), np.nan)
+    if not np.isfinite(sigma).any():
         return Calibration(model.batch(prior, still), still, noise, sigma, directions)
     q = len(prior.mean)
-    step = float(
-        np.median(np.concatenate([np.diff(e.time) for e in used if len(e.time) > 1]) if any(len(e.time) > 1 for e in used) else 0.05)
-    )
-    kind = np.concatenate([np.repeat(np.arange(5), len(e.time)) for e in used])
+    step = float(np.median(np.concatenate([np.diff(e.time) for e in used])))
+    kind = np.concatenate([np.repeat(np.arange(len(EQUATIONS)), len(e.time)) for e in used])
     matrix = np.zeros((len(kind), q))
     matrix[:, :-2] = np.concatenate([e.matrix.reshape(-1, q - 2) for e in used])
     for a in (0, 1):
-        matrix[kind == 3 + a, q - 2 + a] = 1.0
-    values = np.concatenate([e.values.ravel() for e in used])
+        matrix[kind == EQUATIONS.index("moment_x") + a, q - 2 + a] = 1.0
+    keep = np.isin(kind, list(kinds))
+    kind, matrix, values = kind[keep], matrix[keep], np.concatenate([e.values.ravel() for e in used])[keep]
     for _ in range(ROUNDS):
         weight = np.sqrt(step / MEMORY) / sigma[kind]
         rows = Rows(np.vstack([still.matrix, weight[:, None] * matrix]), np.concatenate([still.values, weight * values]))
         found = model.batch(prior, rows)
         left = (values - matrix @ found.mean) ** 2 + np.einsum("ri,ij,rj->r", matrix, found.covariance, matrix)
-        sigma = np.sqrt(np.bincount(kind, left, 5) / np.bincount(kind, minlength=5))
+        sigma[list(kinds)] = [float(np.sqrt(np.mean(left[kind == k]))) for k in kinds]
     return Calibration(found, rows, noise, sigma, directions)
 
 
@@ -164,12 +170,12 @@ class Person:
 
 
 def person(
-    subject: str, trials: Sequence[Trial], wanted: Sequence[str], times: float, motion: bool = True, noise: Noise = USUAL
+    subject: str, trials: Sequence[Trial], wanted: Sequence[str], times: float, equations: Sequence[str] = ALL, noise: Noise = USUAL
 ) -> Person | None:
     """The own CoM of one subject; None where no trial has a CoM from markers.
 
-    wanted: tasks or trials that calibrate; empty: all.  times: the prior's spread over the published one [1].  motion: whether moving
-    windows calibrate too. Trials in which other segments are seen than in most do not calibrate: their parameters mean something else.
+    wanted: tasks or trials that calibrate; empty: all.  times: the prior's spread over the published one [1].  equations: which of
+    `ALL` calibrate. Trials in which other segments are seen than in most do not calibrate: their parameters mean something else.
     """
     by_set = Counter(tuple(p.name for p in t.columns.parameters) for t in trials)
     if not by_set:
@@ -179,8 +185,10 @@ def person(
     used = [t for t in alike if not wanted or {t.key["trial"], t.key["task"]} & set(wanted)]
     prior = alike[0].columns.prior(times)
 
+    kinds = {k for k, name in enumerate(EQUATIONS) if name.split("_")[0] in equations}
+
     def told(some: Sequence[Trial], noise: Noise) -> Calibration:
-        return calibrate([w for t in some for w in t.still], [t.moving for t in some] if motion else [], prior, noise)
+        return calibrate([w for t in some for w in t.still if "still" in equations], [t.moving for t in some], prior, noise, kinds)
 
     whole = told(used, noise)
     fold = {t.key["trial"]: i % FOLDS for i, t in enumerate(used)} if not wanted else {}

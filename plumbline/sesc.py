@@ -19,7 +19,7 @@ from plumbline.calibration import Calibration, Person, Trial, person
 from plumbline.filters import known
 from plumbline.markerset import MarkerSet, choose
 from plumbline.models.sesc import Noise, mean_covariance, spread
-from plumbline.moving import equations
+from plumbline.moving import equations as moving_rows
 from plumbline.person_com import Columns, columns
 from plumbline.poses import POSES, posed, straight
 from plumbline.signals import Recording
@@ -37,13 +37,13 @@ REACH = 0.35  # [rad] from the nearest calibration pose, from which on a frame l
 
 def of_part(
     recordings: Iterable[Recording], people: Mapping[str, Participant], markers: str, *, masses: Mapping[str, float],
-    tasks: Sequence[str], motion: bool, window: float, limit: float, sides: str, prior: float,
+    tasks: Sequence[str], equations: Sequence[str], window: float, limit: float, sides: str, prior: float,
 ) -> dict[str, pd.DataFrame]:  # fmt: skip
     """Tables `sesc`, `chain`, `poses`, `guidance` of whole subjects, by name.
 
-    people, markers, masses: as in :func:`plumbline.signals.of_part`.  tasks: tasks or trials that calibrate, empty: all.  motion: whether
-    moving windows do too.  window: length of a still window [s].  limit: by how much motion may move the ZMP off the CoM [m].
-    sides: free or tied.  prior: the spread of people over the published one [1].
+    people, markers, masses: as in :func:`plumbline.signals.of_part`.  tasks: tasks or trials that calibrate, empty: all.  equations:
+    still, force, moment, which of them calibrate.  window: length of a still window [s].  limit: by how much motion may move the ZMP
+    off the CoM [m].  sides: free or tied.  prior: the spread of people over the published one [1].
     """
     tables: dict[str, list[pd.DataFrame]] = {name: [] for name in ("sesc", "chain", "poses", "guidance")}
     gate = Gate(window, limit)
@@ -51,7 +51,7 @@ def of_part(
         who = people.get(subject, Participant(subject))
         found = [_trial(r, choose(markers, r.markers), who, masses.get(subject, math.nan), gate, sides == "tied") for r in group]
         trials = [t for t, _ in found if t is not None]
-        one = person(subject, trials, tasks, prior, motion)
+        one = person(subject, trials, tasks, prior, equations)
         if one is None:
             continue
         standing = next((b for t, b in found if t is not None and b is not None), None)
@@ -75,7 +75,7 @@ def _trial(
     weight = mass if np.isfinite(mass) else r.mass
     force = forces.net(r.plates, r.time, standing)
     made, found = windows(frame, force, r.time, weight, gate, tied)
-    moving = equations(made, force, frame.angular_momentum(r.time, weight), r.time, weight)
+    moving = moving_rows(made, force, frame.angular_momentum(r.time, weight), r.time, weight)
     t = r.trial
     key = {"trial": t.trial, "subject": t.subject, "task": t.task, "condition": t.condition}
     return Trial(key, r.time, made, found, moving), _upright(frame)
@@ -148,8 +148,9 @@ def _guidance(one: Person, standing: body.Body | None) -> dict[str, Any]:
     """What is known of the CoM over what the subject does, whether the vertical is, and the poses to record next."""
     c = one.calibration
     p, noise = c.posterior, c.noise
-    motion = np.concatenate([t.columns.basis[known(t.columns.table)] for t in one.trials])
-    motion = motion[np.unique(np.linspace(0, len(motion) - 1, FRAMES).astype(int))]
+    motion, ways = (np.concatenate([v(t.columns)[known(t.columns.table)] for t in one.trials]) for v in (_basis, _directions))
+    pick = np.unique(np.linspace(0, len(motion) - 1, FRAMES).astype(int))
+    motion, ways = motion[pick], ways[pick]
     prior = p.prior.covariance[:-2, :-2]
     before, now = guidance.mean_spread(motion, prior), np.hypot(guidance.mean_spread(motion, c.covariance), noise.floor)
     rests = guidance.rests_on_prior(c.rows.matrix, prior, motion) if p.rows else guidance.WIDER
@@ -157,11 +158,20 @@ def _guidance(one: Person, standing: body.Body | None) -> dict[str, Any]:
     out: dict[str, Any] = {"subject": one.subject, "windows": len(c.directions), "misfit": p.misfit, "floor": noise.floor}
     for i, a in enumerate("xyz"):
         out |= {f"table_sd_{a}": before[i], f"sd_{a}": now[i]}
+    out["outside"] = float(np.mean(guidance.outside(ways, c.directions, REACH))) if len(c.directions) else 1.0
     out |= {"vertical_rests": rests, "vertical_observable": rests < guidance.RESTS}
     gains = [float(g) for g in p.gains if g > 0.01]
     out |= {"learnt": int(np.sum(p.gains > 1.0)), "parameters": len(p.mean), "gains": json.dumps([round(g, 2) for g in gains])}
     out |= {"next": json.dumps([{"pose": s.pose, "sd": [round(float(v), 5) for v in s.sd]} for s in steps])}
     return out
+
+
+def _basis(c: Columns) -> Array:
+    return c.basis
+
+
+def _directions(c: Columns) -> Array:
+    return c.directions
 
 
 def _next(covariance: Array, motion: Array, standing: body.Body, noise: Noise) -> Iterator[guidance.Step]:

@@ -15,7 +15,7 @@ from plumbline.sesc import of_part
 from plumbline.simulate import multi_contact, nine_segments, routes
 from plumbline.study import Participant, Trial
 
-OPTIONS = {"tasks": (), "motion": False, "window": 1.0, "limit": 0.002, "sides": "free", "prior": 1.0}
+OPTIONS = {"tasks": (), "equations": ("still",), "window": 1.0, "limit": 0.002, "sides": "free", "prior": 1.0}
 
 
 def _set() -> MarkerSet:
