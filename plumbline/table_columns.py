@@ -131,6 +131,7 @@ TABLES: dict[str, list[Column]] = {
         _c("floor", "float", "m", "what no chain follows, raised until the misfit is one"),
         *_xyz("table_sd", "m", "predicted error of the table's CoM over what the subject does"),
         *_xyz("sd", "m", "predicted error of the own CoM"),
+        _c("outside", "float", "1", "share of the frames in which a segment points further than 0.35 rad from any calibration pose"),
         _c(
             "vertical_rests",
             "float",

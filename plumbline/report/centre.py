@@ -25,7 +25,7 @@ def own(guidance: pd.DataFrame) -> Sheet:
         "subject": ("subject", text), "windows": ("still windows", whole), "learnt": ("directions learnt", whole),
         **{f"table_sd_{a}": (f"table, {w} [mm]", decimals(1, 1000.0)) for a, w in zip("xyz", ("right", "forward", "up"), strict=True)},
         **{f"sd_{a}": (f"own, {w} [mm]", decimals(1, 1000.0)) for a, w in zip("xyz", ("right", "forward", "up"), strict=True)},
-        "vertical": ("the vertical", joined), "what": ("record next", cell),
+        "outside": ("outside of still poses [%]", decimals(0, 100.0)), "vertical": ("the vertical", joined), "what": ("record next", cell),
     }  # fmt: skip
     return sheet(shown, columns, "guidance", "No CoM from markers, so none of the subject's own.")
 
