@@ -18,16 +18,22 @@ def all_sheets(tables: Mapping[str, pd.DataFrame]) -> dict[str, Sheet]:
 def own(guidance: pd.DataFrame) -> Sheet:
     """How well each subject's own CoM is known, and which pose to record next."""
     shown = guidance.assign(
+        table=_three(guidance, "table_sd"),
+        own=_three(guidance, "sd"),
         vertical=[rests(bool(ok), int(n)) for ok, n in zip(guidance["vertical_observable"], guidance["learnt"], strict=True)],
         what=pd.Series([following(str(n)) for n in guidance["next"]], index=guidance.index, dtype=object),
     )
     columns: dict[str, tuple[str, Show]] = {
         "subject": ("subject", text), "windows": ("still windows", whole), "learnt": ("directions learnt", whole),
-        **{f"table_sd_{a}": (f"table, {w} [mm]", decimals(1, 1000.0)) for a, w in zip("xyz", ("right", "forward", "up"), strict=True)},
-        **{f"sd_{a}": (f"own, {w} [mm]", decimals(1, 1000.0)) for a, w in zip("xyz", ("right", "forward", "up"), strict=True)},
+        "table": ("table: right / forward / up [mm]", text), "own": ("own: right / forward / up [mm]", text),
         "outside": ("outside of still poses [%]", decimals(0, 100.0)), "vertical": ("the vertical", joined), "what": ("record next", cell),
     }  # fmt: skip
     return sheet(shown, columns, "guidance", "No CoM from markers, so none of the subject's own.")
+
+
+def _three(guidance: pd.DataFrame, name: str) -> list[str]:
+    """Predicted errors of the three directions in one cell."""
+    return [" / ".join(f"{1e3 * v:.1f}" for v in row) for row in guidance[[f"{name}_{a}" for a in "xyz"]].to_numpy(float)]
 
 
 def rests(observable: bool, learnt: int) -> str:
