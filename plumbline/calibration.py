@@ -92,8 +92,7 @@ def _still(chosen: Sequence[Told], q: int, noise: Noise, directions: Array) -> R
     for trial in dict.fromkeys(t for t, _ in chosen):
         mine = [i for i, (t, _) in enumerate(chosen) if t == trial]
         at, n = np.array([chosen[i][1].middle for i in mine]), chosen[mine[0]][1].samples
-        length = float(np.min(np.diff(at))) if len(at) > 1 else 1.0
-        covariance[np.ix_(mine, mine)] += model.mean_covariance(at, length, n, noise)
+        covariance[np.ix_(mine, mine)] += model.mean_covariance(at, chosen[mine[0]][1].length, n, noise)
     matrix, values, unit = [], [], 0.0
     for a in (0, 1):
         h = np.column_stack([np.array([w.basis[a] for _, w in chosen]), np.tile(np.eye(2)[a], (len(chosen), 1))])
@@ -135,9 +134,10 @@ def _with_motion(
 
 @dataclass(frozen=True)
 class Trial:
-    """A trial of a subject: its key, columns in all frames, still windows and equations of motion."""
+    """A trial of a subject: its key, what a config may call it, columns in all frames, still windows and equations of motion."""
 
     key: dict[str, str]
+    names: frozenset[str]
     time: Array
     columns: Columns
     windows: list[Window]
@@ -148,18 +148,19 @@ class Trial:
         """Windows that can calibrate."""
         return [(self.key["trial"], w) for w in self.windows if not w.reason]
 
-    @property
-    def moving(self) -> Equations:
-        """Equations of motion outside of the still windows."""
-        return self.motion.outside([(w.middle - w.length / 2, w.middle + w.length / 2) for _, w in self.still])
+    def moving(self, still: bool) -> Equations:
+        """Equations of motion.  still: without those inside of the still windows, which calibrate already."""
+        spans = [(w.middle - w.length / 2, w.middle + w.length / 2) for _, w in self.still] if still else []
+        return self.motion.outside(spans)
 
 
 @dataclass(frozen=True)
 class Person:
     """A subject's own CoM.
 
-    calibration: from all of its trials that calibrate.  others: trial -> the same without that trial (without its fold, where there are
-    many); the whole one where the user says which trials calibrate: the others are left out already.
+    trials: with the segments that most trials have.  calibration: from all of them that calibrate.  others: trial -> the calibration
+    that stands for it where it is judged: without it (without its fold, where there are many); where the user says which trials
+    calibrate, the whole one. blind: trials that `others` has not seen.
     """
 
     subject: str
@@ -167,31 +168,40 @@ class Person:
     parameters: tuple[Parameter, ...]
     calibration: Calibration
     others: dict[str, Calibration]
+    blind: frozenset[str]
 
 
 def person(
-    subject: str, trials: Sequence[Trial], wanted: Sequence[str], times: float, equations: Sequence[str] = ALL, noise: Noise = USUAL
-) -> Person | None:
+    subject: str, trials: Sequence[Trial], wanted: Sequence[str], times: float, equations: Sequence[str] = ALL, noise: Noise = USUAL,
+    left_out: Sequence[str] = (),
+) -> Person | None:  # fmt: skip
     """The own CoM of one subject; None where no trial has a CoM from markers.
 
-    wanted: tasks or trials that calibrate; empty: all.  times: the prior's spread over the published one [1].  equations: which of
-    `ALL` calibrate. Trials in which other segments are seen than in most do not calibrate: their parameters mean something else.
+    wanted: tasks or trials that calibrate; empty: all but those of `left_out`.  times: the prior's spread over the published one [1].
+    equations: which of `ALL` calibrate. Trials in which other segments are seen than in most do not calibrate: their parameters mean
+    something else.
     """
     by_set = Counter(tuple(p.name for p in t.columns.parameters) for t in trials)
     if not by_set:
         return None
     usual = by_set.most_common(1)[0][0]
     alike = [t for t in trials if tuple(p.name for p in t.columns.parameters) == usual]
-    used = [t for t in alike if not wanted or {t.key["trial"], t.key["task"]} & set(wanted)]
+    used = [t for t in alike if calibrates(t, wanted, left_out)]
     prior = alike[0].columns.prior(times)
-
+    still = "still" in equations
     kinds = {k for k, name in enumerate(EQUATIONS) if name.split("_")[0] in equations}
 
     def told(some: Sequence[Trial], noise: Noise) -> Calibration:
-        return calibrate([w for t in some for w in t.still if "still" in equations], [t.moving for t in some], prior, noise, kinds)
+        return calibrate([w for t in some for w in t.still if still], [t.moving(still) for t in some], prior, noise, kinds)
 
     whole = told(used, noise)
-    fold = {t.key["trial"]: i % FOLDS for i, t in enumerate(used)} if not wanted else {}
+    fold = {} if wanted or left_out else {t.key["trial"]: i % FOLDS for i, t in enumerate(used)}
     without = {k: told([t for t in used if fold[t.key["trial"]] != k], noise) for k in set(fold.values())}
     others = {t.key["trial"]: without.get(fold.get(t.key["trial"], -1), whole) for t in alike}
-    return Person(subject, alike, alike[0].columns.parameters, whole, others)
+    seen = {t.key["trial"] for t in used} - fold.keys()
+    return Person(subject, alike, alike[0].columns.parameters, whole, others, frozenset(others.keys() - seen))
+
+
+def calibrates(trial: Trial, wanted: Sequence[str], left_out: Sequence[str]) -> bool:
+    """Whether a trial calibrates: it is asked for, or nothing is and it is not left out for a comparison."""
+    return bool(trial.names & set(wanted)) if wanted else not trial.names & set(left_out)

@@ -6,7 +6,7 @@ construction: their residual is shown, and not ranked. A delay of the force reco
 undone first for what the markers make; a constant is taken off in each trial, as the shear of plates has a zero error.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -27,17 +27,27 @@ METHODS: Mapping[str, str] = {"table": "com_table", "lab": "com_lab", "sesc": "c
 FROM_FORCE = ("force", "fused")
 
 
-def centres(signals: pd.DataFrame, coverage: pd.DataFrame, poses: pd.DataFrame, *, half_width: float, exponent: int) -> pd.DataFrame:
+def centres(
+    signals: pd.DataFrame, coverage: pd.DataFrame, poses: pd.DataFrame, *, half_width: float, exponent: int, tasks: Sequence[str] = ()
+) -> pd.DataFrame:  # fmt: skip
     """Table `centres` of a part.
 
-    half_width: of the bump [s].  Windows in which the vertical lacks more than
-    2 % of body weight by any method are left out: something touches the person there."""
+    half_width: of the bump [s].  tasks: tasks or trials that calibrate the own CoM; where given, the others alone are judged, for all
+    methods, if there are any. Windows in which the vertical lacks more than 2 % of body weight are left out: something touches the
+    person there.
+    """
     rows = [
         row
         for subject, trials in signals.groupby("subject", observed=True, sort=True)
-        for row in _subject(str(subject), trials, coverage, poses[poses["subject"] == subject], half_width, exponent)
+        for row in _subject(str(subject), _blind(trials, tasks), coverage, poses[poses["subject"] == subject], half_width, exponent)
     ]
     return pd.DataFrame(rows, columns=[c.name for c in TABLES["centres"]])
+
+
+def _blind(signals: pd.DataFrame, tasks: Sequence[str]) -> pd.DataFrame:
+    """Trials that the own CoM has not seen; all where there are no others."""
+    rest = signals[~(signals["task"].isin(tasks) | signals["trial"].isin(tasks))]
+    return rest if len(rest) else signals
 
 
 def _subject(
@@ -48,18 +58,30 @@ def _subject(
     each = [_residuals(rows, mass.get(t, np.nan), half_width, exponent) for t, rows in trials]
     left = {m: np.concatenate([e[m] for e in each]) for m in METHODS}
     off = {m: _at_rest(trials, poses, c) for m, c in METHODS.items()}
-    made = {m: _rms(r) for m, r in left.items()}
-    judged = {m: float(np.linalg.norm(v)) for m, v in made.items() if m not in FROM_FORCE and np.isfinite(v).all()}
-    order = sorted(judged, key=lambda m: judged[m])
+    moving, still = ({m: _rms(v[m]) for m in METHODS} for v in (left, off))
+    rank, rank_still = _ranks(moving, left), _ranks(still, off)
     for method in METHODS:
         if len(left[method]) or len(off[method]):
             yield {
                 "subject": subject, "method": method, "windows": len(left[method]), "poses": len(off[method]),
-                **{f"r_force_{a}": v for a, v in zip("xyz", made[method], strict=True)},
-                **{f"static_{a}": v for a, v in zip("xy", _rms(off[method]), strict=True)},
-                "rank": order.index(method) + 1 if method in order else 0,
-                "note": "made from the force: its residual says nothing" if method in FROM_FORCE else "",
+                **{f"r_force_{a}": v for a, v in zip("xyz", moving[method], strict=True)},
+                **{f"static_{a}": v for a, v in zip("xy", still[method], strict=True)},
+                "rank": rank.get(method, 0), "rank_still": rank_still.get(method, 0), "note": _note(method, left, off),
             }  # fmt: skip
+
+
+def _ranks(size: Mapping[str, Array], seen: Mapping[str, Array]) -> dict[str, int]:
+    """Place of each method that was judged on as much as any; those made from the force have none."""
+    most = max(len(seen[m]) for m in METHODS if m not in FROM_FORCE)
+    fair = {m: float(np.linalg.norm(size[m])) for m in METHODS if m not in FROM_FORCE and len(seen[m]) == most > 0}
+    return {m: k for k, m in enumerate(sorted(fair, key=lambda m: fair[m]), 1)}
+
+
+def _note(method: str, left: Mapping[str, Array], off: Mapping[str, Array]) -> str:
+    if method in FROM_FORCE:
+        return "made from the force: its residual says nothing"
+    fewer = any(len(v[method]) < max(len(v[m]) for m in METHODS if m not in FROM_FORCE) for v in (left, off))
+    return "judged on fewer windows than another: not ranked there" if fewer else ""
 
 
 def _residuals(rows: pd.DataFrame, mass: float, half_width: float, exponent: int) -> dict[str, Array]:
@@ -77,8 +99,8 @@ def _residuals(rows: pd.DataFrame, mass: float, half_width: float, exponent: int
     r = {m: b.second(v) + fixed[m] for m, v in com.items()}
     whole = [m for m in METHODS if m not in FROM_FORCE and known(r[m]).any()]
     good = np.logical_and.reduce([known(r[m]) for m in whole]) if whole else np.zeros(len(time), dtype=bool)
-    for m in whole:  # a contact that no plate measured is nobody's fault
-        good &= ~(np.abs(r[m][:, 2]) > LOAD * G)
+    if whole:  # a contact that no plate measured is nobody's fault
+        good &= ~(np.abs(r[whole[0]][:, 2]) > LOAD * G)
     picked = np.flatnonzero(good)[:: max(round(half_width * rate * STRIDE), 1)]
     kept = {m: v[picked][known(v[picked])] for m, v in r.items()}
     return {m: v - v.mean(axis=0) if len(v) else v for m, v in kept.items()}
@@ -88,7 +110,7 @@ def _at_rest(trials: list[tuple[str, pd.DataFrame]], poses: pd.DataFrame, name: 
     """CoM less ground projection of the still windows [m], (k, 2)."""
     out = []
     for trial, rows in trials:
-        mine = poses[(poses["trial"] == trial) & poses["used"]]
+        mine = poses[(poses["trial"] == trial) & poses["still"]]
         time, com = rows["time"].to_numpy(), rows[[f"{name}_x", f"{name}_y"]].to_numpy()
         for at, length, x, y in mine[["time", "length", "ground_x", "ground_y"]].to_numpy():
             inside = com[np.abs(time - at) <= length / 2]

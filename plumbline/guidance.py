@@ -40,7 +40,7 @@ def rests_on_prior(rows: Array, prior: Array, motion: Array) -> float:
     rows: whitened rows (r, q + 2), the constant error of the CoP, which nothing is trusted of here, in the last two columns.
     prior: covariance of the parameters (q, q).  motion: basis of the intended motion (n, 3, q).
     """
-    project, _ = np.linalg.qr(rows[:, -2:])
+    project, _ = np.linalg.qr(rows[:, -2:][:, rows[:, -2:].any(axis=0)])
     free = rows[:, :-2] - project @ (project.T @ rows[:, :-2])
     return float(mean_spread(motion, after(WIDER**2 * prior, free))[2] / mean_spread(motion, after(prior, free))[2])
 
@@ -73,5 +73,7 @@ def outside(directions: Array, known: Array, reach: float) -> NDArray[np.bool_]:
 
     directions: unit vectors (n, s, 3).  known: of the calibration poses (k, s, 3).
     """
-    nearest = np.max(np.einsum("nsi,ksi->nks", directions, known), axis=1)
-    return np.asarray((nearest < np.cos(reach)).any(axis=1))
+    far = np.zeros(len(directions), dtype=bool)
+    for s in range(directions.shape[1]):  # one segment at a time: all at once would not fit into memory
+        far |= ~((directions[:, s] @ known[:, s].T).max(axis=1) >= np.cos(reach))  # so that a missing segment counts as far
+    return far

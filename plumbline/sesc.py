@@ -15,7 +15,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from plumbline import body, contact, forces, guidance, support
-from plumbline.calibration import Calibration, Person, Trial, person
+from plumbline.calibration import Calibration, Person, Trial, calibrates, person
+from plumbline.errors import PlumblineError
 from plumbline.filters import known
 from plumbline.markerset import MarkerSet, choose
 from plumbline.models.sesc import Noise, mean_covariance, spread
@@ -24,7 +25,7 @@ from plumbline.person_com import Columns, columns
 from plumbline.poses import POSES, posed, straight
 from plumbline.signals import Recording
 from plumbline.still import Gate, windows
-from plumbline.study import Participant
+from plumbline.study import Participant, names
 from plumbline.tables import joined
 
 Array = NDArray[np.float64]
@@ -37,28 +38,34 @@ REACH = 0.35  # [rad] from the nearest calibration pose, from which on a frame l
 
 def of_part(
     recordings: Iterable[Recording], people: Mapping[str, Participant], markers: str, *, masses: Mapping[str, float],
-    tasks: Sequence[str], equations: Sequence[str], window: float, limit: float, sides: str, prior: float,
+    tasks: Sequence[str], equations: Sequence[str], window: float, limit: float, sides: str, prior: float, left_out: Sequence[str] = (),
 ) -> dict[str, pd.DataFrame]:  # fmt: skip
     """Tables `sesc`, `chain`, `poses`, `guidance` of whole subjects, by name.
 
     people, markers, masses: as in :func:`plumbline.signals.of_part`.  tasks: tasks or trials that calibrate, empty: all.  equations:
     still, force, moment, which of them calibrate.  window: length of a still window [s].  limit: by how much motion may move the ZMP
-    off the CoM [m].  sides: free or tied.  prior: the spread of people over the published one [1].
+    off the CoM [m].  sides: free or tied.  prior: the spread of people over the published one [1].  left_out: tasks or trials that
+    are judged elsewhere, and calibrate only where `tasks` has them. Recordings of a subject follow one another, else PlumblineError.
     """
     tables: dict[str, list[pd.DataFrame]] = {name: [] for name in ("sesc", "chain", "poses", "guidance")}
     gate = Gate(window, limit)
+    done = set[str]()
     for subject, group in groupby(recordings, key=lambda r: r.trial.subject):
+        if subject in done:
+            raise PlumblineError(f"the recordings of {subject} do not follow one another: sort them by subject")
+        done.add(subject)
         who = people.get(subject, Participant(subject))
         found = [_trial(r, choose(markers, r.markers), who, masses.get(subject, math.nan), gate, sides == "tied") for r in group]
         trials = [t for t, _ in found if t is not None]
-        one = person(subject, trials, tasks, prior, equations)
+        one = person(subject, trials, tasks, prior, equations, left_out=left_out)
         if one is None:
             continue
-        standing = next((b for t, b in found if t is not None and b is not None), None)
+        mine = {t.key["trial"] for t in one.trials}
+        standing = next(b for t, b in found if t is not None and b is not None and t.key["trial"] in mine)
         tables["sesc"] += [_frames(one, t) for t in one.trials]
         tables["chain"].append(_chain(one))
-        tables["poses"].append(_poses(one, trials, tasks))
-        tables["guidance"].append(pd.DataFrame([_guidance(one, standing)]))
+        tables["poses"].append(_poses(one, trials, tasks, left_out))
+        tables["guidance"].append(pd.DataFrame([_guidance(one, standing, sides == "tied")]))
     return {name: joined(name, frames) for name, frames in tables.items()}
 
 
@@ -72,13 +79,13 @@ def _trial(
     if not known(frame.com()).any():
         return None, None
     standing = contact.of_feet(r.markers, support.feet(r.markers, markerset), r.time)
-    weight = mass if np.isfinite(mass) else r.mass
+    weight = next((m for m in (mass, r.mass, who.mass or math.nan) if np.isfinite(m)), math.nan)
     force = forces.net(r.plates, r.time, standing)
     made, found = windows(frame, force, r.time, weight, gate, tied)
     moving = moving_rows(made, force, frame.angular_momentum(r.time, weight), r.time, weight)
     t = r.trial
     key = {"trial": t.trial, "subject": t.subject, "task": t.task, "condition": t.condition}
-    return Trial(key, r.time, made, found, moving), _upright(frame)
+    return Trial(key, frozenset(names(t.trial, t.task, t.files)), r.time, made, found, moving), _upright(frame)
 
 
 def _upright(frame: body.Body) -> body.Body:
@@ -124,19 +131,21 @@ def _chain(one: Person) -> pd.DataFrame:
     )  # fmt: skip
 
 
-def _poses(one: Person, trials: Sequence[Trial], tasks: Sequence[str]) -> pd.DataFrame:
+def _poses(one: Person, trials: Sequence[Trial], tasks: Sequence[str], left_out: Sequence[str]) -> pd.DataFrame:
     rows = []
     alike = {t.key["trial"] for t in one.trials}
     for t in trials:
-        chosen = not tasks or bool({t.key["trial"], t.key["task"]} & set(tasks))
+        chosen, trial = calibrates(t, tasks, left_out), t.key["trial"]
+        judge = one.others[trial] if trial in one.blind and one.others[trial].posterior.rows else None
         for w in t.windows:
-            reason = w.reason or ("" if chosen else "not among sesc.tasks")
-            reason = reason if t.key["trial"] in alike else "other segments are seen than in the subject's other trials"
-            by_others = w.table + w.basis @ one.others[t.key["trial"]].mean if t.key["trial"] in alike else np.full(3, np.nan)
+            reason = w.reason or ("" if chosen else "not among sesc.tasks" if tasks else "left out: evaluation.test")
+            reason = reason if trial in alike else "other segments are seen than in the subject's other trials"
+            by_others = w.table + w.basis @ judge.mean if judge is not None else np.full(3, np.nan)
             off, table = by_others[:2] - w.ground, w.table[:2] - w.ground
             rows.append(
                 t.key | {
-                    "time": w.middle, "length": w.length, "used": not reason, "reason": reason, "load": w.load, "shift": w.shift,
+                    "time": w.middle, "length": w.length, "still": not w.reason, "used": not reason, "reason": reason,
+                    "load": w.load, "shift": w.shift,
                     "ground_x": w.ground[0], "ground_y": w.ground[1], "table_error_x": table[0], "table_error_y": table[1],
                     "sesc_error_x": off[0], "sesc_error_y": off[1],
                 }
@@ -144,7 +153,7 @@ def _poses(one: Person, trials: Sequence[Trial], tasks: Sequence[str]) -> pd.Dat
     return pd.DataFrame(rows)
 
 
-def _guidance(one: Person, standing: body.Body | None) -> dict[str, Any]:
+def _guidance(one: Person, standing: body.Body, tied: bool) -> dict[str, Any]:
     """What is known of the CoM over what the subject does, whether the vertical is, and the poses to record next."""
     c = one.calibration
     p, noise = c.posterior, c.noise
@@ -154,14 +163,14 @@ def _guidance(one: Person, standing: body.Body | None) -> dict[str, Any]:
     prior = p.prior.covariance[:-2, :-2]
     before, now = guidance.mean_spread(motion, prior), np.hypot(guidance.mean_spread(motion, c.covariance), noise.floor)
     rests = guidance.rests_on_prior(c.rows.matrix, prior, motion) if p.rows else guidance.WIDER
-    steps = list(_next(p.covariance, motion, standing, noise)) if standing is not None else []
+    steps = list(_next(p.covariance, motion, standing, noise, tied))
     out: dict[str, Any] = {"subject": one.subject, "windows": len(c.directions), "misfit": p.misfit, "floor": noise.floor}
     for i, a in enumerate("xyz"):
         out |= {f"table_sd_{a}": before[i], f"sd_{a}": now[i]}
     out["outside"] = float(np.mean(guidance.outside(ways, c.directions, REACH))) if len(c.directions) else 1.0
     out |= {"vertical_rests": rests, "vertical_observable": rests < guidance.RESTS}
     gains = [float(g) for g in p.gains if g > 0.01]
-    out |= {"learnt": int(np.sum(p.gains > 1.0)), "parameters": len(p.mean), "gains": json.dumps([round(g, 2) for g in gains])}
+    out |= {"learnt": int(np.sum(p.gains > 1.0)), "parameters": len(c.mean), "gains": json.dumps([round(g, 2) for g in gains])}
     out |= {"next": json.dumps([{"pose": s.pose, "sd": [round(float(v), 5) for v in s.sd]} for s in steps])}
     return out
 
@@ -174,9 +183,9 @@ def _directions(c: Columns) -> Array:
     return c.directions
 
 
-def _next(covariance: Array, motion: Array, standing: body.Body, noise: Noise) -> Iterator[guidance.Step]:
+def _next(covariance: Array, motion: Array, standing: body.Body, noise: Noise, tied: bool) -> Iterator[guidance.Step]:
     """The poses to record next, each held for `HOLD`.  covariance: of the parameters and the CoP's constant error (q + 2, q + 2)."""
-    candidates = {name: np.hstack([columns(posed(standing, name)).basis[0, :2], np.eye(2)]) for name in POSES}
+    candidates = {name: np.hstack([columns(posed(standing, name), tied).basis[0, :2], np.eye(2)]) for name in POSES}
     padded = np.concatenate([motion, np.zeros((len(motion), 3, 2))], axis=2)
     yield from guidance.next_poses(covariance, padded, candidates, hold_sd(noise), NEXT)
 

@@ -22,6 +22,7 @@ from plumbline.physics import G
 
 Array = NDArray[np.float64]
 
+FEWEST = 6  # frames in a window
 LOAD = 0.02  # [1] of body weight that may be missing or too much
 PULL = 0.01  # [1] of body weight to the side in somebody who is still; zero errors of a plate's shear reach half of it
 SPEED = 0.05  # [m/s] of the CoM, from which on a pose is no longer one
@@ -65,7 +66,7 @@ def windows(body: Body, force: Forces, time: Array, mass: float, gate: Gate, tie
 
 def _windows(c: Columns, force: Forces, time: Array, mass: float, gate: Gate) -> Iterator[Window]:
     step = float(np.median(np.diff(time))) if len(time) > 1 else np.inf
-    n = max(round(gate.length / step), 2) if np.isfinite(step) else 2
+    n = max(round(gate.length / step), FEWEST) if np.isfinite(step) else FEWEST
     for start in range(0, len(time) - n + 1, n):
         w = slice(start, start + n)
         with np.errstate(invalid="ignore"):
@@ -93,6 +94,8 @@ def _reason(table: Array, zmp: Array, load: float, shift: float, step: float, he
     moved = float(curve) * height / G
     if moved > gate.limit:
         return f"motion moves the ZMP by {1e3 * moved:.1f} mm"
+    if not np.isfinite(load):
+        return "body mass or vertical load not known: nobody can say whether something was left unmeasured"
     if abs(load - 1.0) > LOAD:
         return f"the plates carry {load:.1%} of body weight: a hand, a seat or a person was not measured"
     if shift > PULL * height:

@@ -84,9 +84,11 @@ TABLES: dict[str, list[Column]] = {
     "sesc": [
         *KEY,
         _c("frame", "int", "", "from 0 within the trial"),
-        *_xyz("com_sesc", "m", "the subject's own CoM; NaN where no still window could be used"),
+        *_xyz("com_sesc", "m", "the subject's own CoM; NaN where nothing calibrates"),
         *_xyz("com_sesc_sd", "m", "its predicted standard deviation"),
-        *_xyz("com_others", "m", "the same told by the subject's other trials alone: what a comparison may use"),
+        *_xyz(
+            "com_others", "m", "the same told by the subject's other trials alone; by `sesc.tasks` (or all but `evaluation.test`) where set"
+        ),
         _c("outside", "bool", "", "a segment points further than 0.35 rad from where it pointed in any calibration pose"),
     ],
     "chain": [
@@ -102,6 +104,7 @@ TABLES: dict[str, list[Column]] = {
         *KEY,
         _c("time", "float", "s", "middle of the window, the file's own time"),
         _c("length", "float", "s", "of the window"),
+        _c("still", "bool", "", "the window shows somebody at rest with every contact measured"),
         _c("used", "bool", "", "the window calibrates"),
         _c("reason", "str", "", "why not; empty where it does"),
         _c("load", "float", "1", "what the plates carry, of body weight"),
@@ -110,7 +113,7 @@ TABLES: dict[str, list[Column]] = {
         _c("ground_y", "float", "m", "the same, forward"),
         _c("table_error_x", "float", "m", "CoM of the segment table minus ground projection, right"),
         _c("table_error_y", "float", "m", "the same, forward"),
-        _c("sesc_error_x", "float", "m", "own CoM, told by windows of other trials alone, minus ground projection, right"),
+        _c("sesc_error_x", "float", "m", "own CoM, told by other trials alone (NaN where there are none), minus ground projection, right"),
         _c("sesc_error_y", "float", "m", "the same, forward"),
     ],
     "centres": [
@@ -122,13 +125,14 @@ TABLES: dict[str, list[Column]] = {
         _c("static_x", "float", "m", "rms distance from the ground projection of the still windows, right"),
         _c("static_y", "float", "m", "the same, forward"),
         _c("rank", "int", "", "by r_force, all directions together; 0: not ranked"),
+        _c("rank_still", "int", "", "by the still windows; 0: not ranked"),
         _c("note", "str", "", "why not; empty where it is"),
     ],
     "guidance": [
         KEY[1],
         _c("windows", "int", "", "still windows behind the calibration"),
-        _c("misfit", "float", "1", "mean square of what is left of them, over what their noise says"),
-        _c("floor", "float", "m", "what no chain follows, raised until the misfit is one"),
+        _c("misfit", "float", "1", "mean square of what is left of all rows, over what their noise says"),
+        _c("floor", "float", "m", "what no chain follows, at its usual size or, where the windows fit badly, at the likeliest"),
         *_xyz("table_sd", "m", "predicted error of the table's CoM over what the subject does"),
         *_xyz("sd", "m", "predicted error of the own CoM"),
         _c("outside", "float", "1", "share of the frames in which a segment points further than 0.35 rad from any calibration pose"),
@@ -140,7 +144,7 @@ TABLES: dict[str, list[Column]] = {
         ),
         _c("vertical_observable", "bool", "", "it grows less than twofold"),
         _c("learnt", "int", "", "directions that the poses tell better than the table does"),
-        _c("parameters", "int", "", "parameters of the chain"),
+        _c("parameters", "int", "", "parameters of the body"),
         _c("gains", "str", "", "how many times stronger than the prior the poses speak along each direction, JSON list"),
         _c("next", "str", "", "poses to record next, and the predicted error [m] of right, forward, up after each, JSON"),
     ],
@@ -154,7 +158,9 @@ TABLES: dict[str, list[Column]] = {
         *_xyz("com_force", "m", "CoM by double integration of the force (band-limited; mean from the CoP)"),
         *_xyz("com_lab", "m", "CoM as the file itself holds it"),
         *_xyz("com_sesc", "m", "the subject's own CoM (`sesc`)"),
-        *_xyz("com_others", "m", "the same told by the subject's other trials alone: what a comparison may use"),
+        *_xyz(
+            "com_others", "m", "the same told by the subject's other trials alone; by `sesc.tasks` (or all but `evaluation.test`) where set"
+        ),
         *_xyz("com_fused", "m", "CoM of the table held together with the force: above 0.3 Hz the force decides"),
         *_xyz("grf", "N", "net ground reaction, unfiltered"),
         *_xyz("zmp", "m", "net centre of pressure in the ground plane, unfiltered"),

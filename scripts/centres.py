@@ -9,6 +9,6 @@ snakemake: Snakemake
 stamp = job.start(snakemake)
 given = snakemake.input
 columns = [f"{k}_{a}" for k in (*METHODS.values(), "grf") for a in "xyz"]
-signals = tables.read("signals", given.signals, columns=["trial", "subject", "frame", "time", *columns])
+signals = tables.read("signals", given.signals, columns=["trial", "subject", "task", "frame", "time", *columns])
 coverage, poses = (tables.read(n, given[n]) for n in ("coverage", "poses"))
 tables.write("centres", centres(signals, coverage, poses, **snakemake.params.config), snakemake.output.centres, stamp)

@@ -108,6 +108,7 @@ def test_without_plates_the_table_is_all_there_is() -> None:
     found = run([Recording(one.time, 10.0, one.markers, mass=70.0, trial=one.trial)])
     assert found["sesc"]["com_sesc_x"].isna().all()
     assert (found["poses"]["reason"] == "no centre of pressure in all of its frames").all()
+    assert found["poses"]["sesc_error_x"].isna().all()
     assert found["guidance"]["windows"].iloc[0] == 0
 
 
@@ -118,3 +119,50 @@ def test_the_page_says_what_the_vertical_rests_on() -> None:
     assert shown["own"].rows[0][-1].more
     assert any("used" in row for row in shown["poses"].rows)
     assert centre.all_sheets({})["own"].empty
+
+
+def test_sides_can_be_tied() -> None:
+    """`sides: tied` goes through the whole stage, the poses to record next included."""
+    found = run([recording("paper", nine_segments.cohort(1)[0])], sides="tied")
+    assert not found["chain"]["parameter"].str.contains("right|left").any()
+    assert json.loads(found["guidance"]["next"].iloc[0])
+
+
+def test_a_trial_with_other_segments_does_not_calibrate() -> None:
+    """One marker lost in the first trial: its windows say so, the person is told by the others, who have all segments."""
+    person = nine_segments.cohort(1)[0]
+    odd = recording("paper", person, 1)
+    del odd.markers["hand_l"]
+    found = run([odd, recording("extended", person, 2), recording("paper", person, 3)])
+    rows = found["poses"].set_index("trial").loc["sub-01_task-paper_run-01"]
+    assert (rows["reason"] == "other segments are seen than in the subject's other trials").any()
+    assert not rows["used"].any()
+    assert found["guidance"]["windows"].iloc[0] > 0
+
+
+def test_what_is_tested_does_not_calibrate() -> None:
+    """Trials of `evaluation.test` are left out of the calibration unless `sesc.tasks` has them."""
+    person = nine_segments.cohort(1)[0]
+    found = run([recording("paper", person, 1), recording("extended", person, 2)], left_out=["extended"])
+    rest = found["poses"][found["poses"]["task"] == "extended"]
+    assert not rest["used"].any()
+    assert rest["still"].any()
+    assert (rest.loc[rest["still"], "reason"] == "left out: evaluation.test").all()
+    assert rest["sesc_error_x"].notna().all()
+
+
+def test_without_a_mass_nothing_is_still() -> None:
+    """Neither plates nor participants.tsv tell the mass: nobody can say whether a hand was measured, and no window calibrates."""
+    import plumbline.sesc as stage
+
+    one = recording("paper", nine_segments.cohort(1)[0])
+    one.mass = float("nan")
+    original, stage.choose = stage.choose, lambda wanted, labels: _set()
+    try:
+        poor = of_part([one], {"sub-01": Participant("sub-01")}, "auto", masses={}, **OPTIONS)
+        told = of_part([one], {"sub-01": Participant("sub-01", 70.0)}, "auto", masses={}, **OPTIONS)
+    finally:
+        stage.choose = original
+    assert poor["poses"]["reason"].str.contains("body mass or vertical load not known").any()
+    assert not poor["poses"]["used"].any()
+    assert told["poses"]["used"].any()

@@ -109,11 +109,11 @@ def mean_covariance(at: Array, length: float, samples: int, noise: Noise) -> Arr
 
 
 def floor_covariance(turned: Array, noise: Noise) -> Array:
-    """Covariance of what windows share beyond time [m2], (k, k): what no chain follows, and the CoP's constant error.
+    """Covariance of what no chain follows, which alike poses share [m2], (k, k).
 
     turned: rms angle between the segments of two poses [rad], (k, k).
     """
-    return np.asarray(noise.floor**2 * np.exp(-0.5 * (turned / noise.reach) ** 2) + noise.constant**2)
+    return np.asarray(noise.floor**2 * np.exp(-0.5 * (turned / noise.reach) ** 2))
 
 
 def decorrelated(matrix: Array, values: Array, covariance: Array) -> Rows:

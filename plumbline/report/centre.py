@@ -55,9 +55,9 @@ def following(steps: str) -> Cell:
 def methods(centres: pd.DataFrame) -> Sheet:
     """CoM methods side by side."""
     columns: dict[str, tuple[str, Show]] = {
-        "subject": ("subject", text), "method": ("CoM", text), "rank": ("rank", rank), "windows": ("windows in motion", whole),
+        "subject": ("subject", text), "method": ("CoM", text), "rank": ("rank in motion", rank), "windows": ("windows in motion", whole),
         **{f"r_force_{a}": (f"x'' - F/m, {w} [m/s\u00b2]", decimals(3)) for a, w in zip("xyz", ("right", "forward", "up"), strict=True)},
-        "poses": ("still windows", whole),
+        "rank_still": ("rank at rest", rank), "poses": ("still windows", whole),
         "static_x": ("at rest, right [mm]", decimals(1, 1000.0)), "static_y": ("at rest, forward [mm]", decimals(1, 1000.0)),
         "note": ("note", joined),
     }  # fmt: skip

@@ -10,6 +10,6 @@ rule centres:
         "results/logs/centres/{part}.log",
     params:
         code=code("centres.py"),
-        config=WEAK,
+        config={**WEAK, "tasks": config["sesc"]["tasks"]},
     script:
         "../../scripts/centres.py"

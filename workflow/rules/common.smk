@@ -33,6 +33,7 @@ try:
         from plumbline.effects import catalogue
 
         models(config, catalogue(Path(".")))
+    studies.check_names(STUDY.trials, {"sesc.tasks": config["sesc"]["tasks"]})
     studies.check_comparison(STUDY.trials, config["evaluation"]["train"], config["evaluation"]["test"])
 except PlumblineError as error:
     raise WorkflowError(str(error)) from None

@@ -15,7 +15,7 @@ rule sesc:
     priority: 1  # the chain of stages before the figures beside it
     params:
         code=code("sesc.py"),
-        config=config["sesc"],
+        config={**config["sesc"], "left_out": config["evaluation"]["test"]},
         markerset=config["markerset"],
         people=lambda w: {s: vars(p) for s, p in STUDY.participants.items() if PART_OF.get(s) == w.part},
     script:
