@@ -4,8 +4,9 @@ Numerics: ``plumbline/models/sesc.py``; parameters and spreads: ``plumbline/pers
 """
 
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,10 +38,12 @@ LOUDER, RAISED = (1.0, 1.6, 2.5, 4.0, 6.3), (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # 
 class Calibration:
     """What the recordings of a person say of the q parameters.
 
-    posterior: of them and of the CoP's constant error (x, y), q + 2.  rows: of the fit.  noise: with the floor that the data needed.
-    sigma: of each of `EQUATIONS` [m/s2], [m]; NaN without moving windows.  directions: of the segments in the still windows (k, s, 3).
+    count: q.  posterior: of the parameters, then of the CoP's constant error (x, y) in each recording.  rows: of the fit.  noise: with
+    the floor that the data needed.  sigma: of each of `EQUATIONS` [m/s2], [m]; NaN without moving windows.  directions: of the segments
+    in the still windows (k, s, 3).
     """
 
+    count: int
     posterior: Posterior
     rows: Rows
     noise: Noise
@@ -50,18 +53,20 @@ class Calibration:
     @property
     def mean(self) -> Array:
         """Of the parameters (q,)."""
-        return self.posterior.mean[:-2]
+        return self.posterior.mean[: self.count]
 
     @property
     def covariance(self) -> Array:
         """Of the parameters (q, q)."""
-        return self.posterior.covariance[:-2, :-2]
+        return self.posterior.covariance[: self.count, : self.count]
 
 
 def calibrate(
-    windows: Sequence[Told], moving: Sequence[Equations], prior: Prior, noise: Noise = USUAL, kinds: Collection[int] = range(len(EQUATIONS))
+    windows: Sequence[Told], moving: Mapping[str, Equations], prior: Prior, noise: Noise = USUAL,
+    kinds: Collection[int] = range(len(EQUATIONS)),
 ) -> Calibration:  # fmt: skip
-    """The parameters of a person from still windows, all of them used, and from equations of motion, those of `EQUATIONS` in `kinds`.
+    """The parameters of a person from still windows, all of them used, and from equations of motion (trial -> equations), those of
+    `EQUATIONS` in `kinds`. Each recording has its own constant error of the CoP, as the feet stand elsewhere on the plates.
 
     Where the residual of the still windows is larger than its noise and chance make it, the noise is what makes them most likely: more
     of what no chain follows, or more of everything, widens the bands. The noise of each equation of motion is what is left of it, found
@@ -69,10 +74,13 @@ def calibrate(
     """
     chosen = list(windows[:: -(-len(windows) // MOST)]) if windows else []
     directions = np.array([w.directions for _, w in chosen])
-    wide = Prior(np.append(prior.mean, np.zeros(2)), block_diag(prior.covariance, noise.constant**2 * np.eye(2)))
+    q, moving = len(prior.mean), {t: e for t, e in moving.items() if len(e.time) > 1}
+    constants = _Constants(q, tuple(dict.fromkeys([t for t, _ in chosen] + [*moving])))
+    more = constants.width - q
+    wide = Prior(np.append(prior.mean, np.zeros(more)), block_diag(prior.covariance, noise.constant**2 * np.eye(more)))
 
     def told(noise: Noise) -> Posterior:
-        return model.batch(wide, _still(chosen, len(prior.mean), noise, directions))
+        return model.batch(wide, _still(chosen, constants, noise, directions))
 
     chance = 1.0 + CHANCE * np.sqrt(1.0 / max(len(chosen), 1))  # two rows a window: the mean of n squares has variance 2/n
     if chosen and told(noise).misfit > chance:
@@ -80,14 +88,32 @@ def calibrate(
             replace(noise, white=noise.white * k, slow=noise.slow * k, floor=f) for k in LOUDER for f in noise.floor * np.array(RAISED)
         ]
         noise = max(louder, key=lambda n: told(n).evidence)
-    rows = _still(chosen, len(prior.mean), noise, directions)
-    return _with_motion(rows, moving, kinds, wide, noise, directions)
+    rows = _still(chosen, constants, noise, directions)
+    sigma = np.where([k in kinds for k in range(len(EQUATIONS))], START, np.nan) if moving else np.full(len(EQUATIONS), np.nan)
+    if not np.isfinite(sigma).any():
+        return Calibration(q, model.batch(wide, rows), rows, noise, sigma, directions)
+    posterior, both = _with_motion(rows, _moving(moving, constants, kinds), wide, sigma)
+    return Calibration(q, posterior, both, noise, sigma, directions)
 
 
-def _still(chosen: Sequence[Told], q: int, noise: Noise, directions: Array) -> Rows:
-    """Rows of the still windows, first x then y, decorrelated, with the constant error of the CoP in the last two columns."""
+class _Constants(NamedTuple):
+    """Where the constant errors of the CoP stand, behind the q parameters: two for each recording."""
+
+    q: int
+    trials: tuple[str, ...]
+
+    @property
+    def width(self) -> int:
+        return self.q + 2 * len(self.trials)
+
+    def column(self, trial: str, axis: int) -> int:
+        return self.q + 2 * self.trials.index(trial) + axis
+
+
+def _still(chosen: Sequence[Told], constants: _Constants, noise: Noise, directions: Array) -> Rows:
+    """Rows of the still windows, first x then y, decorrelated."""
     if not chosen:
-        return Rows(np.zeros((0, q + 2)), np.zeros(0))
+        return Rows(np.zeros((0, constants.width)), np.zeros(0))
     covariance = model.floor_covariance(turned(directions), noise)
     for trial in dict.fromkeys(t for t, _ in chosen):
         mine = [i for i, (t, _) in enumerate(chosen) if t == trial]
@@ -95,7 +121,9 @@ def _still(chosen: Sequence[Told], q: int, noise: Noise, directions: Array) -> R
         covariance[np.ix_(mine, mine)] += model.mean_covariance(at, chosen[mine[0]][1].length, n, noise)
     matrix, values, unit = [], [], 0.0
     for a in (0, 1):
-        h = np.column_stack([np.array([w.basis[a] for _, w in chosen]), np.tile(np.eye(2)[a], (len(chosen), 1))])
+        h = np.zeros((len(chosen), constants.width))
+        h[:, : constants.q] = [w.basis[a] for _, w in chosen]
+        h[np.arange(len(chosen)), [constants.column(t, a) for t, _ in chosen]] = 1.0
         rows = model.decorrelated(h, np.array([w.ground[a] - w.table[a] for _, w in chosen]), covariance)
         matrix.append(rows.matrix)
         values.append(rows.values)
@@ -103,30 +131,42 @@ def _still(chosen: Sequence[Told], q: int, noise: Noise, directions: Array) -> R
     return Rows(np.vstack(matrix), np.concatenate(values), unit)
 
 
-def _with_motion(
-    still: Rows, moving: Sequence[Equations], kinds: Collection[int], prior: Prior, noise: Noise, directions: Array
-) -> Calibration:  # fmt: skip
-    """Still rows and equations of motion together; the noise of the latter by expectation and maximisation."""
-    used = [e for e in moving if len(e.time) > 1]
-    sigma = np.where([k in kinds for k in range(len(EQUATIONS))], START, np.nan) if used else np.full(len(EQUATIONS), np.nan)
-    if not np.isfinite(sigma).any():
-        return Calibration(model.batch(prior, still), still, noise, sigma, directions)
-    q = len(prior.mean)
-    step = float(np.median(np.concatenate([np.diff(e.time) for e in used])))
-    kind = np.concatenate([np.repeat(np.arange(len(EQUATIONS)), len(e.time)) for e in used])
-    matrix = np.zeros((len(kind), q))
-    matrix[:, :-2] = np.concatenate([e.matrix.reshape(-1, q - 2) for e in used])
-    for a in (0, 1):
-        matrix[kind == EQUATIONS.index("moment_x") + a, q - 2 + a] = 1.0
-    keep = np.isin(kind, list(kinds))
-    kind, matrix, values = kind[keep], matrix[keep], np.concatenate([e.values.ravel() for e in used])[keep]
+class _Moving(NamedTuple):
+    """Rows of the equations of motion, not weighted: index in `EQUATIONS` (r,), matrix (r, q), values (r,), time between them [s]."""
+
+    kind: NDArray[np.int_]
+    matrix: Array
+    values: Array
+    step: float
+
+
+def _moving(moving: Mapping[str, Equations], constants: _Constants, kinds: Collection[int]) -> _Moving:
+    order = sorted(kinds)
+    kind, matrix, values = [], [], []
+    for trial, e in moving.items():
+        n = len(e.time)
+        m = np.zeros((len(EQUATIONS), n, constants.width))
+        m[:, :, : constants.q] = e.matrix
+        for a in (0, 1):
+            m[EQUATIONS.index("moment_x") + a, :, constants.column(trial, a)] = 1.0
+        kind.append(np.repeat(order, n))
+        matrix.append(m[order].reshape(-1, constants.width))
+        values.append(e.values[order].ravel())
+    step = float(np.median(np.concatenate([np.diff(e.time) for e in moving.values()])))
+    return _Moving(np.concatenate(kind), np.concatenate(matrix), np.concatenate(values), step)
+
+
+def _with_motion(still: Rows, moving: _Moving, prior: Prior, sigma: Array) -> tuple[Posterior, Rows]:
+    """Still rows and equations of motion together; the noise of the latter, `sigma`, is found in place by expectation and maximisation."""
+    kind, matrix, values, step = moving
     for _ in range(ROUNDS):
         weight = np.sqrt(step / MEMORY) / sigma[kind]
         rows = Rows(np.vstack([still.matrix, weight[:, None] * matrix]), np.concatenate([still.values, weight * values]))
         found = model.batch(prior, rows)
         left = (values - matrix @ found.mean) ** 2 + np.einsum("ri,ij,rj->r", matrix, found.covariance, matrix)
-        sigma[list(kinds)] = [float(np.sqrt(np.mean(left[kind == k]))) for k in kinds]
-    return Calibration(found, rows, noise, sigma, directions)
+        for k in np.unique(kind):
+            sigma[k] = float(np.sqrt(np.mean(left[kind == k])))
+    return found, rows
 
 
 # -- a subject --------------------------------------------------------------------------------------------------------
@@ -192,7 +232,7 @@ def person(
     kinds = {k for k, name in enumerate(EQUATIONS) if name.split("_")[0] in equations}
 
     def told(some: Sequence[Trial], noise: Noise) -> Calibration:
-        return calibrate([w for t in some for w in t.still if still], [t.moving(still) for t in some], prior, noise, kinds)
+        return calibrate([w for t in some for w in t.still if still], {t.key["trial"]: t.moving(still) for t in some}, prior, noise, kinds)
 
     whole = told(used, noise)
     fold = {} if wanted or left_out else {t.key["trial"]: i % FOLDS for i, t in enumerate(used)}

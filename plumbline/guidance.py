@@ -37,11 +37,12 @@ def rests_on_prior(rows: Array, prior: Array, motion: Array) -> float:
 
     1: the poses decide; `WIDER`: the prior.
 
-    rows: whitened rows (r, q + 2), the constant error of the CoP, which nothing is trusted of here, in the last two columns.
+    rows: whitened rows (r, q + k), in the last columns constant errors of the CoP, of which nothing is trusted here.
     prior: covariance of the parameters (q, q).  motion: basis of the intended motion (n, 3, q).
     """
-    project, _ = np.linalg.qr(rows[:, -2:][:, rows[:, -2:].any(axis=0)])
-    free = rows[:, :-2] - project @ (project.T @ rows[:, :-2])
+    own, constants = rows[:, : len(prior)], rows[:, len(prior) :]
+    project, _ = np.linalg.qr(constants[:, constants.any(axis=0)])
+    free = own - project @ (project.T @ own)
     return float(mean_spread(motion, after(WIDER**2 * prior, free))[2] / mean_spread(motion, after(prior, free))[2])
 
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from plumbline import body, contact, forces, guidance, support
 from plumbline.calibration import Calibration, Person, Trial, calibrates, person
@@ -122,7 +123,7 @@ def _frames(one: Person, t: Trial) -> pd.DataFrame:
 
 def _chain(one: Person) -> pd.DataFrame:
     c = one.calibration
-    before, after = np.sqrt(np.diag(c.posterior.prior.covariance))[:-2], np.sqrt(np.diag(c.covariance))
+    before, after = np.sqrt(np.diag(c.posterior.prior.covariance))[: c.count], np.sqrt(np.diag(c.covariance))
     return pd.DataFrame(
         {
             "subject": one.subject, "parameter": [x.name for x in one.parameters], "unit": [x.unit for x in one.parameters],
@@ -160,10 +161,10 @@ def _guidance(one: Person, standing: body.Body, tied: bool) -> dict[str, Any]:
     motion, ways = (np.concatenate([v(t.columns)[known(t.columns.table)] for t in one.trials]) for v in (_basis, _directions))
     pick = np.unique(np.linspace(0, len(motion) - 1, FRAMES).astype(int))
     motion, ways = motion[pick], ways[pick]
-    prior = p.prior.covariance[:-2, :-2]
+    prior = p.prior.covariance[: c.count, : c.count]
     before, now = guidance.mean_spread(motion, prior), np.hypot(guidance.mean_spread(motion, c.covariance), noise.floor)
     rests = guidance.rests_on_prior(c.rows.matrix, prior, motion) if p.rows else guidance.WIDER
-    steps = list(_next(p.covariance, motion, standing, noise, tied))
+    steps = list(_next(c.covariance, motion, standing, noise, tied))
     out: dict[str, Any] = {"subject": one.subject, "windows": len(c.directions), "misfit": p.misfit, "floor": noise.floor}
     for i, a in enumerate("xyz"):
         out |= {f"table_sd_{a}": before[i], f"sd_{a}": now[i]}
@@ -184,10 +185,11 @@ def _directions(c: Columns) -> Array:
 
 
 def _next(covariance: Array, motion: Array, standing: body.Body, noise: Noise, tied: bool) -> Iterator[guidance.Step]:
-    """The poses to record next, each held for `HOLD`.  covariance: of the parameters and the CoP's constant error (q + 2, q + 2)."""
+    """The poses to record next, one after the other in one recording, each held for `HOLD`.  covariance: of the parameters (q, q)."""
     candidates = {name: np.hstack([columns(posed(standing, name), tied).basis[0, :2], np.eye(2)]) for name in POSES}
     padded = np.concatenate([motion, np.zeros((len(motion), 3, 2))], axis=2)
-    yield from guidance.next_poses(covariance, padded, candidates, hold_sd(noise), NEXT)
+    unknown = block_diag(covariance, noise.constant**2 * np.eye(2))
+    yield from guidance.next_poses(unknown, padded, candidates, hold_sd(noise), NEXT)
 
 
 def hold_sd(noise: Noise, seconds: float = HOLD, rate: float = 100.0) -> float:

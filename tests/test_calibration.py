@@ -8,7 +8,7 @@ import pytest
 
 from plumbline import guidance
 from plumbline.calibration import Calibration, Told, calibrate
-from plumbline.models.sesc import Noise, spread
+from plumbline.models.sesc import USUAL, Noise, spread
 from plumbline.person_com import Columns, columns
 from plumbline.simulate import multi_contact, nine_segments, routes
 from plumbline.still import Gate, windows
@@ -40,7 +40,7 @@ def told(name: str, person: nine_segments.Body, tied: bool = False) -> list[Told
 @cache
 def calibrated(name: str, number: int) -> Calibration:
     person = nine_segments.cohort(PEOPLE)[number]
-    return calibrate(told(name, person), [], posed(name).prior(), Noise(white=0.003 * np.sqrt(0.1)))
+    return calibrate(told(name, person), {}, posed(name).prior(), Noise(white=0.003 * np.sqrt(0.1)))
 
 
 def error(cal: Calibration, number: int) -> np.ndarray:
@@ -96,17 +96,28 @@ def test_a_constant_error_of_the_cop_is_three_times_as_large_upwards() -> None:
         force = made_person.forces(recording)
         force.zmp[:, 1] += shift
         made = [("p", w) for w in windows(body, force, recording.time, person.mass, Gate(), True)[1] if not w.reason]
-        return np.asarray(c.basis @ calibrate(made, [], weak, quiet).mean).mean(axis=0)
+        return np.asarray(c.basis @ calibrate(made, {}, weak, quiet).mean).mean(axis=0)
 
     up = (found(0.001) - found(0.0)) / 0.001
     assert up[1] == pytest.approx(1.0, abs=0.1)
     assert 1.5 < abs(up[2]) < 5.0
 
 
+def test_each_recording_has_its_own_constant_error_of_the_cop() -> None:
+    """The same windows in two recordings, the CoP of one off by 4 mm: the difference is the recordings', not noise and not the person's."""
+    c, good = posed("extended"), told("extended", nine_segments.cohort(1)[0])
+    moved = [("b", type(w)(**{**vars(w), "ground": w.ground + np.array([0.0, 0.004])})) for _, w in good]
+    prior = c.prior()
+    apart, as_one = (calibrate([*good, *((name, w) for _, w in moved)], {}, prior) for name in ("b", good[0][0]))
+    assert apart.posterior.mean[apart.count :].reshape(-1, 2)[:, 1] == pytest.approx([-0.002, 0.002], abs=0.0007)
+    assert apart.noise == USUAL
+    assert as_one.posterior.misfit > 2.0 * apart.posterior.misfit or as_one.noise.white > USUAL.white
+
+
 def test_without_a_window_the_table_is_left() -> None:
     """No still window: the parameters are the table's, with the spread of people."""
     prior = posed("paper").prior()
-    cal = calibrate([], [], prior)
+    cal = calibrate([], {}, prior)
     assert not cal.mean.any()
     assert np.allclose(cal.covariance, prior.covariance)
 
@@ -118,7 +129,7 @@ def test_what_no_chain_follows_widens_the_bands() -> None:
     rng = np.random.default_rng(3)
     bad = [(t, type(w)(**{**vars(w), "ground": w.ground + 0.01 * rng.normal(size=2)})) for t, w in good]
     prior = posed("extended").prior()
-    one, two = calibrate(good, [], prior), calibrate(bad, [], prior)
+    one, two = calibrate(good, {}, prior), calibrate(bad, {}, prior)
     assert one.noise.white * 1.5 < two.noise.white
     assert 0.5 < two.posterior.misfit < 1.5
     assert np.trace(two.covariance) > np.trace(one.covariance)

@@ -34,7 +34,7 @@ def test_motion_tells_a_person_from_the_table() -> None:
     person = nine_segments.draw_subject(5, hidden=False)
     r, force, still = squats(person)
     c = columns(made_person.body(r.joints))
-    cal = calibrate([], [equations(c, force, still, r.time, person.mass)], c.prior())
+    cal = calibrate([], {"a": equations(c, force, still, r.time, person.mass)}, c.prior())
     before, after = c.table - r.com, c.table + c.basis @ cal.mean - r.com
     assert np.linalg.norm(after.std(axis=0)) < 0.3 * np.linalg.norm(before.std(axis=0))
     assert np.abs(after[:, :2]).max() < 0.002

@@ -51,8 +51,8 @@ class Noise:
     """Noise of a ground projection; the numbers are those of a good force plate under somebody who stands.
 
     white: sd of one sample [m].  slow: sd of a part that is forgotten over `memory` [s].  floor: sd [m] of what the chain cannot
-    follow, alike in poses whose segments are turned by less than `reach` [rad].  constant: sd of the error of the CoP that all
-    windows share [m].
+    follow, alike in poses whose segments are turned by less than `reach` [rad].  constant: sd of the error of the CoP that a
+    recording has throughout [m].
     """
 
     white: float = 0.003

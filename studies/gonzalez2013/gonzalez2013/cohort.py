@@ -124,7 +124,7 @@ def observed(plan: Protocol, people: Sequence[nine.Body]) -> pd.DataFrame:
         one = person(plan, who)
         for name in ("static", "extended"):
             c = es.calibrated([one.scenes[name]])
-            rests = guidance.rests_on_prior(c.rows.matrix, c.posterior.prior.covariance[:-2, :-2], motion)
+            rests = guidance.rests_on_prior(c.rows.matrix, c.posterior.prior.covariance[: c.count, : c.count], motion)
             sd = np.hypot(guidance.mean_spread(motion, c.covariance), c.noise.floor)
             row = {"protocol": name, "subject": who.participant_id, "rests": rests, "observable": rests < guidance.RESTS}
             row |= {"floor": c.noise.floor, "misfit": c.posterior.misfit, "windows": len(c.directions)}

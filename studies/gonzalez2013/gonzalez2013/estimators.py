@@ -43,7 +43,7 @@ def calibrated(scenes: Sequence[Scene], times: float = 1.0, shift: Array | None 
     prior = scenes[0].columns.prior(times)
     if shift is not None:
         prior = Prior(prior.mean + shift * np.sqrt(np.diag(prior.covariance)), prior.covariance)
-    return calibrate([(str(i), w) for i, s in enumerate(scenes) for w in s.still], [], prior, noise)
+    return calibrate([(str(i), w) for i, s in enumerate(scenes) for w in s.still], {}, prior, noise)
 
 
 def of_calibration(c: Calibration) -> Told:
