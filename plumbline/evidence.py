@@ -41,7 +41,8 @@ class Weak:
 
     com, velocity, zmp: bump means.  acceleration: weak x'' [m/s2].  force: Fx/m [m/s2], NaN without shear.  vertical: z'' + g - Fz/m.
     lever: x - p [m].  cluster: number of the independent piece.  terms: effect -> part -> (n, k).  lacking: effect -> what it needs.
-    centre: effect -> coefficients that were taken out of the channels first.  use: of the trial.
+    centre: effect -> coefficients that were taken out of the channels first.  use: of the trial.  w2: (z'' + g)/z of
+    each window [1/s2]; None where read from a table.
     feet: CoP of both plates from the middles of their feet,
     mean over the trial [m]; NaN where the feet are not known from markers, and for the forward axis.
     noise: sd of the white noise of x, p [m], z [m], Fx, Fz [N]; NaN where not known.  unit: sums of squares of the bump and its curvature.
@@ -70,6 +71,7 @@ class Weak:
     centre: Mapping[str, Array] = field(default_factory=dict)
     feet: float = float("nan")
     use: str = BOTH
+    w2: Array | None = None
 
     @property
     def lever(self) -> Array:
@@ -172,11 +174,12 @@ def of_one(about: Any, channels: Channels, axis: str, plant: Plant, effects: Map
             lacking[name] = f"{', '.join(gaps)} without gaps" if gaps else "columns without NaN"
     x, z = channels.com_x, channels.com_z
     vertical = mean(z, bump.curvature) + channels.g - mean(channels.grf_z) / channels.mass
+    w2 = (mean(z, bump.curvature) + channels.g) / mean(z)
     key = (about["trial"], about["subject"], about["task"], about["condition"], axis)
     motion = (mean(x), mean(x, bump.slope), mean(channels.zmp_x), mean(x, bump.curvature))
     return Weak(
         *key, picked, channels.time[picked], plant.cluster[picked], *motion,
-        mean(channels.grf_x) / channels.mass, vertical, channels.mass, plant.height, _noise(channels, plant), bump, terms, lacking,
+        mean(channels.grf_x) / channels.mass, vertical, channels.mass, plant.height, _noise(channels, plant), bump, terms, lacking, w2=w2,
     )  # fmt: skip
 
 

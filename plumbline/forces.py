@@ -27,6 +27,7 @@ Mask = NDArray[np.bool_]
 
 MIN_LOAD = 20.0  # [N] vertical load below which a centre of pressure means nothing
 ZERO = 1e-6  # [N], [N m] averages leave 1e-14 of zeros
+ABOVE = 0.05  # [m] above the floor, from which on a sensor's place is told; moments about a point of the floor do not tell it
 MIN_RATIO = 1.5  # [1] plate samples per frame from which on they are averaged
 
 
@@ -47,13 +48,15 @@ class Plate(Protocol):
 class Forces:
     """Forces at the n frames: grf [N], zmp [m] (net and per foot), each (n, 3), NaN where unknown or unloaded.
 
-    surface: height of the plates [m], NaN without plates.  feet: "left"/"right" -> (grf, cop).  notes: words.
+    surface: height of the plates [m], NaN without plates.  feet: "left"/"right" -> (grf, cop).  hand: where handles and seats bear
+    [m], (n, 3), while nothing is on them where that was or will be; NaN without any whose height is told.  notes: words.
     """
 
     grf: Array
     zmp: Array
     surface: float
     feet: dict[str, tuple[Array, Array]] = field(default_factory=dict)
+    hand: Array = field(default_factory=lambda: np.zeros((0, 3)))
     notes: list[str] = field(default_factory=list)
 
 
@@ -111,7 +114,7 @@ def net(plates: Sequence[Plate], frames: Array, feet: Mapping[str, Foot] = Mappi
     """
     n = len(frames)
     used = [p for p in plates if len(p.time) > 1 and (p.foot == NO_FOOT or _carries(p))]
-    out = Forces(np.full((n, 3), np.nan), np.full((n, 3), np.nan), np.nan)
+    out = Forces(np.full((n, 3), np.nan), np.full((n, 3), np.nan), np.nan, hand=np.full((n, 3), np.nan))
     if not used:
         return out
     out.surface = surface(p.cop for p in floor(used))
@@ -121,6 +124,9 @@ def net(plates: Sequence[Plate], frames: Array, feet: Mapping[str, Foot] = Mappi
     least = light_below(p.force for p in used)
     wrenches = [_loads(p, frames, least, feet, out.notes) for p in used]
     out.grf, out.zmp = _sum(wrenches, used)
+    held = [p for p in used if p.foot == NO_FOOT and surface([p.cop]) - np.nan_to_num(out.surface) > ABOVE]
+    if held:
+        out.hand = np.mean([_place(p, frames) for p in held], axis=0)
     for side in ("left", "right"):
         mine = [i for i, p in enumerate(used) if p.foot == side]
         if mine:
@@ -138,6 +144,12 @@ def _sum(wrenches: Sequence[Array], plates: Sequence[Plate]) -> tuple[Array, Arr
     force = total[:, :3].copy()
     force[:, [bool(any(np.isnan(p.force[:, k]).all() for p in plates)) for k in range(3)]] = np.nan
     return force, _cop(total, surface(p.cop for p in floor(plates)))
+
+
+def _place(plate: Plate, frames: Array) -> Array:
+    """Where a handle or a seat bears at the frames [m], (n, 3)."""
+    seen = known(plate.cop)
+    return np.column_stack([np.interp(frames, plate.time[seen], plate.cop[seen, k]) for k in range(3)])
 
 
 def _loads(plate: Plate, frames: Array, least: float, feet: Mapping[str, Foot], notes: list[str]) -> Array:

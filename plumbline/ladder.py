@@ -129,6 +129,8 @@ def verdict(said: Said, evaluation: Mapping[str, Any], effects: Mapping[str, Eff
     effects = effects if effects is not None else catalogue()
     model = {axis: _model(said, axis, effects, models) for axis in AXES}
     by_axis = {axis: _blocks(said, axis, "all", effects, model[axis]) for axis in AXES}
+    for axis, block in by_axis.items():
+        block["plant"]["reason"] = "; ".join(filter(None, [block["plant"]["reason"], *_not_judged(said.ladder, axis, effects, models)]))
     subjects = sorted(said.coverage["subject"].unique())
     return {
         "schema_version": 1,
@@ -218,6 +220,16 @@ def _notes(floor: float, coverage: pd.DataFrame, judged: "pd.Series[bool]") -> I
         yield f"in {share} the CoM was integrated from the force and follows it by assumption"
     if floor != floor:
         yield f"the noise floor is not identifiable: {_why_no_floor(coverage[judged])}"
+
+
+def _not_judged(ladder: pd.DataFrame, axis: str, effects: Mapping[str, Effect], models: Models) -> Iterator[str]:
+    """Configured models without a rung, whole or for some subjects: their error is not that of the same people as the base's."""
+    mine = ladder[(ladder["ledger"] == "plant") & (ladder["axis"] == axis) & (ladder["kind"] == "weak") & (ladder["subject"] != "all")]
+    everybody = set(mine.loc[(mine["model"] == "base") & mine["error_mm"].notna(), "subject"])
+    for name, members in models:
+        without = sorted(everybody - set(mine.loc[mine["model"] == name, "subject"]))
+        if without and any(effects[m].ledger == "plant" for m in members):
+            yield f"model '{name}' has no rung for {', '.join(without)}: what it adds is not seen there, or needs what some trial lacks"
 
 
 def _why_no_error(coverage: pd.DataFrame) -> str:

@@ -224,7 +224,7 @@ def only(w: Weak, chosen: Mask) -> Weak:
     """Some windows of a trial."""
     arrays = ("frame", "time", "cluster", "com", "velocity", "zmp", "acceleration", "force", "vertical")
     terms = {name: {part: values[chosen] for part, values in parts.items()} for name, parts in w.terms.items()}
-    return replace(w, **{k: getattr(w, k)[chosen] for k in arrays}, terms=terms)
+    return replace(w, **{k: getattr(w, k)[chosen] for k in arrays}, terms=terms, w2=None if w.w2 is None else w.w2[chosen])
 
 
 def line(windows: Sequence[Weak], contact: Contact, rest: Sequence[Array], h: float, without: int = -1) -> Line:

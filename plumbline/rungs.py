@@ -174,6 +174,7 @@ class _Bench:
         still = _Bench(outer.quiet(self.windows, contact), self.effects, set(members), self.level, self.evaluation, self.exact)
         number = {w.trial: k for k, w in enumerate(still.windows)}
         rest = [self.error(w, self.fit(()), ()) for w in self.windows]
+        times: list[Array | float] = [1.0] * len(rest)
         judged: set[str] = set()
         for _, train, test in folds(trials, self.evaluation):
             got = still.fit(members, np.isin(still.sums.trial, [number[t.trial] for t in train if t.trial in number]))
@@ -181,9 +182,10 @@ class _Bench:
                 judged.add(t.trial)
                 k = next(k for k, w in enumerate(self.windows) if w.trial == t.trial)
                 rest[k] = still.error(self.windows[k], got, (*members, CONTACT))
-        for w, error in zip(self.windows, outer.explained(self.windows, contact, rest), strict=True):
+                times[k] = still.over_force(self.windows[k], got, members)
+        for w, error, scale in zip(self.windows, outer.explained(self.windows, contact, rest), times, strict=True):
             if w.trial in judged:
-                yield self._told(w, error, np.zeros(0))
+                yield self._told(w, error * scale, np.zeros(0))
 
     def fit(self, members: Sequence[str], among: NDArray[np.bool_] | None = None) -> Fit:
         """Coefficients of a model over some pieces."""
@@ -214,13 +216,18 @@ class _Bench:
     def _row(self, k: int, got: Fit, members: Sequence[str], motion: _Motion | None) -> dict[str, Any]:
         w = self.windows[k]
         miss = self._free(got, members, motion) if motion is not None else np.zeros(0)
-        return self._told(w, self.error(w, got, members), miss)
+        return self._told(w, self.error(w, got, members) * self.over_force(w, got, members), miss)
 
     def _told(self, w: Weak, error: Array, miss: Array) -> dict[str, Any]:
         return {
             "trial": w.trial, "subject": w.subject, "task": w.task, "condition": w.condition, "axis": w.axis, "windows": len(error),
             "square_sum": float(error @ error), "free_run_frames": len(miss), "free_run_square_sum": float(miss @ miss),
         }  # fmt: skip
+
+    def over_force(self, w: Weak, got: Fit, members: Sequence[str]) -> Array | float:
+        """What makes an error over one w2 that of the moment over the vertical force [1]: 1 where the height is taken as constant."""
+        h = float(self._used(got, members)[own(self.sums, "=h")[0]])
+        return 1.0 / (h * w.w2) if self.exact and "height" in members and w.w2 is not None and h > 0 else 1.0
 
     def error(self, w: Weak, got: Fit, members: Sequence[str]) -> Array:
         """Error of a model's equation in each window, as ZMP [m]: (x - p) less what the model gives."""

@@ -119,7 +119,7 @@ def _columns(recording: Recording, markerset: MarkerSet | None, made: _Made, cut
     out |= {"frame": np.arange(n), "time": time} | _xyz("com", com)
     for method in METHODS:
         out |= _xyz(f"com_{method}", made.coms[method])
-    out |= _xyz("grf", force.grf) | _xyz("zmp", force.zmp) | _per_foot(force, n)
+    out |= _xyz("grf", force.grf) | _xyz("zmp", force.zmp) | _xyz("hand", force.hand) | _per_foot(force, n)
     out |= _xyz("ang_mom", frame.angular_momentum(time, made.mass) if frame else made.coms["none"])
     out |= dict(zip(("limit_left", "limit_right", "limit_back", "limit_front"), made.border.limits.T, strict=True))
     out |= _filtered(com, force.zmp, time, recording.rate, cutoff)

@@ -128,6 +128,36 @@ TABLES: dict[str, list[Column]] = {
         _c("rank_still", "int", "", "by the still windows; 0: not ranked"),
         _c("note", "str", "", "why not; empty where it is"),
     ],
+    # -- stability: could the person stay where the feet are
+    "stability": [
+        *KEY,
+        _c("method", "str", "", "whose CoM: table, lab or sesc (the subject's own)"),
+        _c("frame", "int", "", "from 0 within the trial"),
+        _c("omega", "float", "rad/s", "sqrt(g/z), z: height of that CoM over the plates"),
+        _c("xcom_x", "float", "m", "extrapolated CoM x + x'/omega (capture point), right"),
+        _c("xcom_y", "float", "m", "the same, forward"),
+        _c(
+            "margin_x", "float", "m", "margin of stability: from the extrapolated CoM to the nearer border, right or left; negative outside"
+        ),
+        _c("margin_y", "float", "m", "the same, front or back"),
+        _c("step_x", "float", "m", "how far the feet would have to go, right; 0 inside"),
+        _c("step_y", "float", "m", "the same, forward"),
+    ],
+    "margins": [
+        *KEY,
+        _c("method", "str", "", "whose CoM: table, lab or sesc (the subject's own)"),
+        _c("omega", "float", "rad/s", "mean"),
+        *(
+            _c(f"{name}_{a}", "float", unit, f"{what}, {way}")
+            for a, way in (("x", "right or left"), ("y", "front or back"))
+            for name, unit, what in (
+                ("least", "m", "smallest margin of stability"),
+                ("mean", "m", "mean margin of stability"),
+                ("outside", "1", "share of frames with the extrapolated CoM outside the feet"),
+                ("step", "m", "longest missing step"),
+            )
+        ),
+    ],
     "guidance": [
         KEY[1],
         _c("windows", "int", "", "still windows behind the calibration"),
@@ -164,6 +194,7 @@ TABLES: dict[str, list[Column]] = {
         *_xyz("com_fused", "m", "CoM of the table held together with the force: above 0.3 Hz the force decides"),
         *_xyz("grf", "N", "net ground reaction, unfiltered"),
         *_xyz("zmp", "m", "net centre of pressure in the ground plane, unfiltered"),
+        *_xyz("hand", "m", "where handles and seats bear, their mean; NaN without any whose height the file tells"),
         *_xyz(
             "ang_mom",
             "kg m2/s",

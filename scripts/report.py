@@ -15,7 +15,7 @@ params, given = snakemake.params, snakemake.input
 read = {
     n: tables.read_all(n, given[n]) for n in ("trials", "coverage", "loci", "pushes", "trust", "clusters", "choice", "controller", "fit")
 }
-read |= {n: tables.read_all(n, given[n]) for n in ("guidance", "centres", "poses")}
+read |= {n: tables.read_all(n, given[n]) for n in ("guidance", "centres", "poses", "margins")}
 read["where"] = tables.read_all("where", given.where, columns=["subject", "axis", "view"])
 read |= {n: tables.read(n, given[n]) for n in ("ladder", "exclusions", "candidates")}
 read["residuals"] = tables.read_all("residuals", given.residuals, columns=linked.COLUMNS)

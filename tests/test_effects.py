@@ -35,7 +35,9 @@ def channels(seed: int = 1) -> Channels:
 
     values = {"time": t, "com_x": wave(0.03), "zmp_x": wave(0.05), "com_z": 0.95 + wave(0.01), "ang_mom": wave(1.0)}
     values |= {"grf_x": wave(20.0), "grf_z": 700.0 + wave(10.0)}
-    values |= {name: wave(0.1) for name in ("com_y", "zmp_y", "grf_y", "com_lp_x", "com_dot_x", "com_ddot_x", "zmp_lp_x")}
+    values |= {
+        name: wave(0.1) for name in ("com_y", "zmp_y", "grf_y", "hand_x", "hand_z", "com_lp_x", "com_dot_x", "com_ddot_x", "zmp_lp_x")
+    }
     values |= {f"com_{name}_{a}": wave(0.02) for name in ("table", "others") for a in "xyz"}
     return Channels(values, 100.0, 70.0, 1.0)
 

@@ -8,6 +8,7 @@ from made_recording import SOMEBODY, Array, Plate, columns, pendulum
 
 from plumbline import com_force, contact, forces, loads
 from plumbline.contact import Foot
+from plumbline.effects import Channels, catalogue
 from plumbline.markerset import load
 from plumbline.readers.raw import RawPlate
 from plumbline.signals import signals
@@ -246,3 +247,30 @@ def test_a_handle_counts_however_little_it_bears(sign: float) -> None:
     assert got.surface == 0.0
     moment = np.cross(foot_place, foot_load) + np.cross(place, pull)
     np.testing.assert_allclose(got.zmp[250], [-moment[1] / 700.0, moment[0] / 700.0, 0.0], atol=1e-4)
+
+
+@pytest.mark.parametrize("zero", [(6.0, 0.0), (0.0, 8.0)])
+def test_a_zero_error_of_a_hand_is_what_its_effect_says(zero: tuple[float, float]) -> None:
+    """A handle at 1.1 m that reads 6 N too much sideways, or 8 N up: what it does to x'' - w2 (x - p) is the effect's column, to 2 %."""
+    n, place, pull = 501, np.array([0.3, 0.0, 1.1]), np.array([4.0, 0.0, 12.0])
+    extra, time, frames = np.array([zero[0], 0.0, zero[1]]), np.arange(n) / 1000.0, np.arange(50) / 100.0
+
+    def net(force: Array) -> forces.Forces:
+        hand = Plate(time, np.tile(force, (n, 1)), np.tile(place, (n, 1)), np.zeros(n), None, loads.NO_FOOT)
+        return forces.net([*standing(n, load=690.0), hand], frames)
+
+    true, read = net(pull), net(pull + extra)
+    np.testing.assert_allclose(read.hand, np.tile(place, (50, 1)))
+    values = {
+        "zmp_x": read.zmp[:, 0],
+        "grf_x": read.grf[:, 0],
+        "grf_z": read.grf[:, 2],
+        "hand_x": read.hand[:, 0],
+        "hand_z": read.hand[:, 2],
+    }
+    channels = Channels(values | {"time": frames}, 100.0, 70.0, 1.0, w2=9.0)
+    effect = catalogue()["hand_zero"]
+    assert effect.columns is not None
+    assert effect.force is not None
+    np.testing.assert_allclose(effect.columns(channels) @ zero, 9.0 * (read.zmp - true.zmp)[:, 0], rtol=0.02)
+    np.testing.assert_allclose(effect.force(channels) @ zero, (true.grf - read.grf)[:, 0] / 70.0, rtol=1e-9)

@@ -85,3 +85,16 @@ def test_reasons_speak_of_the_judged_trials_only() -> None:
     assert "1 of the 2 trials with a CoM were judged" in reason
     assert "low-passed before" in reason
     assert "integrated from the force" not in reason
+
+
+def test_a_model_without_a_rung_is_told() -> None:
+    """A model that some subjects could not be judged with is named beside the verdict, with who; one of the law alone is not."""
+    table = heldout()
+    rungs = table[table["subject"] == "sub-0"].assign(rung=1, model="own", effects="sesc").drop(columns="noise_variance")
+    models = [("own", ("sesc",)), ("law", ("lag",))]
+    said = verdict(Said(ladder(table, rungs), coverage(), table), with_defaults({})["evaluation"], models=models)
+    for axis in ("lateral", "forward"):
+        reason = said["by_axis"][axis]["plant"]["reason"]
+        assert "model 'own' has no rung for sub-1:" in reason
+        assert "law" not in reason
+    assert said["plant"] == said["by_axis"]["lateral"]["plant"]

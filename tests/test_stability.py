@@ -1,11 +1,14 @@
 """Extrapolated CoM and margin of stability: an inverted pendulum comes back from inside, and falls from outside."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from plumbline.errors import PlumblineError
 from plumbline.models import stability
 from plumbline.physics import G
+from plumbline.stability import stability as stage
+from plumbline.tables import TABLES
 
 Array = np.ndarray
 
@@ -98,3 +101,38 @@ def test_speed_of_a_parabola_is_exact() -> None:
     noise = np.random.default_rng(7).normal(0.0, 1e-3, 20000)
     sd = np.nanstd(stability.speed(noise, np.arange(20000) / 100.0, 0.1))
     assert sd == pytest.approx(1e-3 * np.sqrt(3 / (21 * 0.1**2)), rel=0.1)
+
+
+def frames(borders: float = 0.1) -> pd.DataFrame:
+    """Somebody who sways sideways by 20 mm at 0.5 Hz; the own CoM is 0.1 m lower than the table's; plates at 0.05 m."""
+    t = np.arange(500) / 100.0
+    x = 0.02 * np.sin(np.pi * t)
+    out = {"trial": "a", "subject": "sub-01", "task": "sway", "condition": "", "frame": np.arange(500), "time": t, "zmp_z": 0.05}
+    for name, z in (("table", 1.05), ("lab", np.nan), ("sesc", 0.95)):
+        out |= {f"com_{name}_x": x, f"com_{name}_y": 0.0 * t, f"com_{name}_z": z}
+    out |= {"limit_left": -borders, "limit_right": borders, "limit_back": -np.nan, "limit_front": np.nan}
+    return pd.DataFrame(out)
+
+
+def test_each_com_has_its_own_omega_and_margin() -> None:
+    """Amplitude of the extrapolated CoM is A sqrt(1 + (2 pi f/omega)^2); a lower CoM is nearer; borders not known leave no margin."""
+    tables = stage(frames())
+    assert {name: set(t.columns) for name, t in tables.items()} == {n: {c.name for c in TABLES[n]} for n in ("stability", "margins")}
+    by = tables["margins"].set_index("method")
+    assert list(by.index) == ["table", "sesc"]
+    for method, height in (("table", 1.0), ("sesc", 0.9)):
+        omega = np.sqrt(G / height)
+        assert by.loc[method, "omega"] == pytest.approx(omega)
+        reach = 0.02 * np.sqrt(1.0 + (np.pi / omega) ** 2)
+        assert by.loc[method, "least_x"] == pytest.approx(0.1 - reach, abs=2e-4)
+        assert by.loc[method, "outside_x"] == by.loc[method, "step_x"] == 0.0
+    assert by[["least_y", "mean_y", "outside_y", "step_y"]].isna().all(axis=None)
+    assert tables["stability"]["xcom_y"].notna().any()
+
+
+def test_a_missing_step_is_told_by_its_length() -> None:
+    """Borders at 10 mm: the longest step is how far the extrapolated CoM comes out of them, as the least margin is below zero."""
+    by = stage(frames(0.01))["margins"].set_index("method")
+    np.testing.assert_allclose(by["step_x"], -by["least_x"])
+    assert (by["step_x"] > 0.01).all()
+    assert by["outside_x"].between(0.5, 0.95).all()

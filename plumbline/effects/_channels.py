@@ -42,8 +42,8 @@ def persons(signals: pd.DataFrame, coverage: pd.DataFrame) -> dict[str, Person]:
 class Channels:
     """One trial, one axis; arrays (n,) at the rate of the frames, NaN where not recorded.
 
-    Along the axis that is judged: com_x, zmp_x, grf_x, ang_mom (about the CoM, positive turning +z towards +x); com_z (above the
-    plates), grf_z, time (from the trial's start), and every other column of `signals` by its own name, x for the axis and y for the
+    Along the axis that is judged: com_x, zmp_x, grf_x, ang_mom (about the CoM, positive turning +z towards +x); com_z, hand_z (above
+    the plates), grf_z, time (from the trial's start), and every other column of `signals` by its own name, x for the axis and y for the
     other. `_dot` and `_ddot` behind any name are time derivatives (central differences: the weak form averages them). w2: of the base
     model [1/s2]; mass [kg]; rate [Hz]; height: of the person's CoM [m]; middle: where the person stands along the axis [m]; g.
     """
@@ -105,7 +105,8 @@ def of_trial(frames: pd.DataFrame, axis: str, mass: float, person: Person) -> Ch
             out[name[:-2] + swap[name[-2:]] if name[-2:] in swap else name] = frames[name].to_numpy()
     # about +y a rotation turns +z towards +x; about +x it turns +y towards +z, so the forward axis counts it the other way round
     out["ang_mom"] = out["ang_mom_y"] if axis == "lateral" else -out["ang_mom_y"]
-    out["com_z"] = out["com_z"] - np.nan_to_num(out["zmp_z"])
+    for name in {"com_z", "hand_z"} & out.keys():
+        out[name] = out[name] - np.nan_to_num(out["zmp_z"])
     out["time"] = out["time"] - out["time"][:1]
     rate = (len(frames) - 1) / float(np.ptp(out["time"])) if len(frames) > 1 else float("nan")
     own = float(np.nanmean(out["com_z"])) if np.isfinite(out["com_z"]).any() else float("nan")

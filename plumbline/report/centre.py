@@ -12,7 +12,12 @@ from plumbline.tables import empty
 def all_sheets(tables: Mapping[str, pd.DataFrame]) -> dict[str, Sheet]:
     """Tables of the part by name; those of a study without markers say so."""
     guidance, centres, poses = (tables.get(n, empty(n)) for n in ("guidance", "centres", "poses"))
-    return {"own": own(guidance), "centres": methods(centres), "poses": windows(poses)}
+    return {
+        "own": own(guidance),
+        "centres": methods(centres),
+        "poses": windows(poses),
+        "margins": margins(tables.get("margins", empty("margins"))),
+    }
 
 
 def own(guidance: pd.DataFrame) -> Sheet:
@@ -73,3 +78,20 @@ def windows(poses: pd.DataFrame) -> Sheet:
     """Still windows by what became of them; sizes in the reasons are left to the table."""
     said = poses.assign(what=poses["reason"].str.replace(r"[\d.]+ ?%? ?", "", regex=True).where(~poses["used"], "used"))
     return counted(said, "windows", ["task", "what"], "No CoM from markers.")
+
+
+def margins(margins: pd.DataFrame) -> Sheet:
+    """How near to falling over the feet: by subject, task and CoM."""
+    by = margins.groupby(["subject", "task", "condition", "method"], sort=True, observed=True)
+    values = [f"{k}_{a}" for a in "xy" for k in ("least", "step", "outside")]
+    shown = by[["omega", *values]].median().assign(trials=by.size()).reset_index()
+    columns: dict[str, tuple[str, Show]] = {
+        "subject": ("subject", text), "task": ("task", text), "condition": ("condition", text), "method": ("CoM", text),
+        "trials": ("trials", whole), "omega": ("\u03c9 [rad/s]", decimals(2)),
+    }  # fmt: skip
+    for a, way in (("x", "right or left"), ("y", "front or back")):
+        columns |= {
+            f"least_{a}": (f"smallest margin, {way} [mm]", decimals(0, 1000.0)), f"step_{a}": (f"step, {way} [mm]", decimals(0, 1000.0)),
+            f"outside_{a}": (f"outside, {way} [%]", decimals(0, 100.0)),
+        }  # fmt: skip
+    return sheet(shown, columns, "margins", "No CoM from markers or in the files.")

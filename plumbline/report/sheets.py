@@ -20,6 +20,7 @@ FILES = (
     ("sesc, chain", "sesc/ chain/", "the subject's own CoM frame by frame, with its predicted error; what was learnt of each segment"),
     ("poses, guidance", "poses/ guidance/", "still windows and why others were not used; what is observable, what to record next"),
     ("centres", "centres/", "CoM methods side by side: Newton in motion, the gravity line at rest"),
+    ("stability, margins", "stability/ margins/", "extrapolated CoM and margin of stability frame by frame; by trial"),
     ("pushes, loci", "pushes/ loci/", "windows of unmeasured force; stretches of balancing alone"),
     ("trust, rls", "trust/ rls/", "regimes of each locus and the switches between them; recursive least squares frame by frame"),
     ("clusters, choice", "clusters/ choice/", "\u03c9 of each locus, its cluster, why it was left out; scores by number of clusters"),

@@ -45,7 +45,7 @@ PARTS = sorted(set(PART_OF.values()))
 
 PART_TABLES = ["trials", "markers", "plates", "sesc", "chain", "poses", "guidance", "signals", "coverage", "loci", "pushes"]
 PART_TABLES += ["trust", "rls", "clusters", "choice", "controller", "fit", "heldout", "residuals", "where"]
-PART_TABLES += ["centres", "evidence", "rungs", "contributions", "control"]
+PART_TABLES += ["centres", "stability", "margins", "evidence", "rungs", "contributions", "control"]
 EFFECTS = sorted(str(f) for f in Path("effects").glob("*.py"))  # the study's own
 WEAK = {k: config["evaluation"][k] for k in ("half_width", "exponent")}
 

@@ -11,6 +11,7 @@ rule report:
         guidance=parts("guidance"),
         centres=parts("centres"),
         poses=parts("poses"),
+        margins=parts("margins"),
         trust=parts("trust"),
         clusters=parts("clusters"),
         choice=parts("choice"),

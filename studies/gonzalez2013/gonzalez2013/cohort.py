@@ -21,7 +21,7 @@ from plumbline.simulate import nine_segments as nine
 
 Array = NDArray[np.float64]
 
-PEOPLE, MANY = 40, 200
+PEOPLE, MANY = 40, 1000
 TIMES = (0.25, 1.0, 4.0)  # spread of the prior over the published one
 STARTS = (0.003, 0.01, 0.02, 0.05, 0.1, 0.3, 1.0)  # [m] what the paper's recursion may believe of its start
 FORCE = 0.02  # [m/s2] noise of F/m: 1.4 N in 70 kg
