@@ -64,7 +64,7 @@ def page(
 
     study: its name.  tables: trials, coverage, exclusions, loci, pushes, trust, clusters, choice, controller, fit, where, ladder of all
     parts, residuals of the first; and, where effects were searched for, candidates of the cohort and contributions of the first part.
-    verdict: what results/verdict.json holds.  config: its sections recording, signals, evaluation, models.  pictures: see
+    verdict: what results/verdict.json holds.  config: its sections recording, signals, sesc, evaluation, models.  pictures: see
     :func:`pictures`.  effects: the catalogue, without it the library's.
     """
     known = catalogue() if effects is None else effects
@@ -92,6 +92,7 @@ def page(
         references=methods.references(tables),
         versions=methods.versions(),
         half_width=config["evaluation"]["half_width"],
+        gate=centre.gate(config["sesc"]),
         files=sheets.FILES,
     )
 

@@ -2,10 +2,12 @@
 
 import json
 from collections.abc import Mapping
+from typing import Any
 
 import pandas as pd
 
 from plumbline.report.sheets import Cell, Sheet, Show, cell, counted, decimals, joined, sheet, text, whole
+from plumbline.still import LOAD, PULL, SPEED
 from plumbline.tables import empty
 
 
@@ -72,6 +74,15 @@ def methods(centres: pd.DataFrame) -> Sheet:
 def rank(value: float) -> str:
     """A place; a dash where there is none."""
     return f"{value:.0f}" if value else "\u2013"
+
+
+def gate(sesc: Mapping[str, Any]) -> str:
+    """When a window is still, in words.  sesc: that section of the config."""
+    return (
+        f"A window of {sesc['window']:g} s is still where the motion moves the ZMP by less than {1e3 * sesc['limit']:g} mm (z x''/g), "
+        f"the CoM stays below {SPEED:g} m/s, the plates carry body weight to {LOAD:.0%} and nothing pulls to the side by more than "
+        f"{PULL:.0%} of it."
+    )
 
 
 def windows(poses: pd.DataFrame) -> Sheet:

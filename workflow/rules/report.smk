@@ -40,7 +40,7 @@ rule report:
         "results/logs/report.log",
     params:
         code=code("report.py"),
-        config={k: config[k] for k in ("recording", "signals", "evaluation", "models")},
+        config={k: config[k] for k in ("recording", "signals", "sesc", "evaluation", "models")},
         study="demo study" if Path.cwd() == REPO else Path.cwd().name,
         parts=PARTS,
     script:
